@@ -1,0 +1,1 @@
+"""Acquisition: recordings, their format, time base, quality; knows no driver and no mathematics of robots."""

@@ -1,0 +1,1 @@
+"""Drivers: real and fake hardware behind the same interfaces."""

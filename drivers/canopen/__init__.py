@@ -1,0 +1,1 @@
+"""CANopen drives (CiA 402)."""

@@ -1,0 +1,1 @@
+"""Force plates and base force sensors over serial lines."""

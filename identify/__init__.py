@@ -1,0 +1,1 @@
+"""Identification and diagnosis: pure mathematics on arrays; knows no file, bus or clock."""

@@ -1,0 +1,1 @@
+"""Diagnosis: locate the mismatch, name the missing physics, show the fit improve."""
