@@ -274,11 +274,16 @@ def _find_messages(pieces: _Pieces, buffer: np.ndarray) -> tuple[np.ndarray, np.
     if headers is None:
         offsets = _stepped_offsets(pieces)
         headers = gather(buffer, offsets, MESSAGE_HEADER).view(_MESSAGE)
-    missing = set(np.unique(headers["channel"]).tolist()) - set(pieces.channels)
+    missing = used_channels(headers) - set(pieces.channels)
     if missing:
         raise DataError(f"{pieces.source}: messages refer to channel {min(missing)}, which the log does not "
                         f"describe; `residuum recover` keeps the other topics.")  # fmt: skip
     return offsets, headers
+
+
+def used_channels(headers: np.ndarray) -> set[int]:
+    """The ids of the channels that have messages."""
+    return set(np.flatnonzero(np.bincount(headers["channel"])).tolist())
 
 
 def gather(buffer: np.ndarray, offsets: np.ndarray, size: int) -> np.ndarray:

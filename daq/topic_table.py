@@ -9,7 +9,7 @@ import numpy as np
 
 from daq.cdr import CdrError, Layout, layout_of
 from daq.errors import DataError
-from daq.mcap_file import LogFile, gather
+from daq.mcap_file import LogFile, gather, used_channels
 from daq.mcap_records import MESSAGE_HEADER
 from daq.messages import canonical_schema, fields
 
@@ -53,7 +53,7 @@ class Table:
 
 def topics(log: LogFile) -> dict[str, str]:
     """Topic to type of every CDR topic of a known type that has messages."""
-    used = set(np.unique(log.headers["channel"]).tolist())
+    used = used_channels(log.headers)
     found: dict[str, str] = {}
     for channel in log.channels.values():
         schema = log.schemas.get(channel.schema_id)
@@ -69,13 +69,17 @@ def read_table(log: LogFile, topic: str) -> Table:
         DataError: a message is not what its schema says.
     """
     ids = [channel.id for channel in log.channels.values() if channel.topic == topic]
-    mine = np.flatnonzero(np.isin(log.headers["channel"], ids))
+    wanted = np.zeros(2**16, bool)
+    wanted[ids] = True
+    mine = np.flatnonzero(wanted[log.headers["channel"]])
     headers, offsets = log.headers[mine], log.offsets[mine] + MESSAGE_HEADER
     schema = topics(log)[topic]
     sizes = headers["length"].astype(np.int64) - _MESSAGE_FIELDS
     batches: list[Batch] = []
     try:
-        for size in np.unique(sizes):
+        if sizes.min() < 0:
+            raise CdrError("a record shorter than its own header")
+        for size in np.flatnonzero(np.bincount(sizes)):
             rows = np.flatnonzero(sizes == size)
             batches += _batches_of_size(log.buffer, offsets[rows], rows, int(size), schema)
     except CdrError as error:
