@@ -1,0 +1,158 @@
+"""Weighted least squares with torque constants as further unknowns (Gauss-Newton on a bilinear model).
+
+The measured quantity is the current; the torque it stands for is n K I. Written with the nominal constant,
+y = n K_nom I = s (Phi theta + known) + noise with s = K_nom / K, so that the noise stays on the
+measured side and an errors-in-variables bias cannot arise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.blocks import Block, predict, residual
+from identify.noise import NoiseModel
+from identify.rotations import FloatArray
+
+_ITERATIONS = 30
+_CONVERGED = 1e-9
+# below this share of the largest singular value a direction is not seen at all (rounding of averaged rows)
+_RANK = 1e-9
+_TOUCHED = 1e-5
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A fit.
+
+    Attributes:
+        theta: parameters, shape (P,).
+        scale: K_nominal / K of every joint, shape (n,); 1 where not estimated.
+        free_scales: joints whose scale was estimated, shape (k,).
+        covariance: of (theta, free scales), shape (P + k, P + k), on the identifiable directions.
+        identifiable: of (theta, free scales), shape (P + k,).
+        null_space: orthonormal directions the data do not see, in scaled columns, shape (P + k, d).
+        chi2: weighted sum of squares.
+        rank: number of directions seen.
+        rows: number of rows used.
+        condition_number: of the whitened, column-normalised matrix over the directions seen.
+        jacobian: whitened Jacobian, shape (rows, P + k).
+        whitened: whitened residuals, shape (rows,).
+    """
+
+    theta: FloatArray
+    scale: FloatArray
+    free_scales: FloatArray
+    covariance: FloatArray
+    identifiable: FloatArray
+    null_space: FloatArray
+    chi2: float
+    rank: int
+    rows: int
+    condition_number: float
+    jacobian: FloatArray
+    whitened: FloatArray
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom left."""
+        return self.rows - self.rank
+
+
+def _whitened_system(
+    blocks: tuple[Block, ...], noises: list[NoiseModel], theta: FloatArray, scale: FloatArray, free: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Whitened Jacobian with respect to (theta, free scales), and whitened residual."""
+    jacobians, rests = [], []
+    for block, noise in zip(blocks, noises, strict=True):
+        factors = np.where(block.joint >= 0, scale[np.maximum(block.joint, 0)], 1.0)
+        unscaled = predict(block.columns, block.known, block.joint, theta, np.ones_like(scale))
+        extra = np.zeros((len(block.joint), len(free), unscaled.shape[1]))
+        for column, joint in enumerate(free):
+            extra[block.joint == joint, column] = unscaled[block.joint == joint]
+        jacobian = np.concatenate([factors[:, None, None] * block.columns, extra], axis=1)
+        jacobian *= block.usable[:, None, :]
+        weight = np.sqrt(block.repeats)
+        jacobians.append(weight * noise.whiten(jacobian).transpose(0, 2, 1).reshape(-1, jacobian.shape[1]))
+        rests.append(weight * noise.whiten(residual(block, theta, scale)).ravel())
+    return np.vstack(jacobians), np.concatenate(rests)
+
+
+def _step(jacobian: FloatArray, rest: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Solve one linearised problem: step, column norms, singular values, right vectors."""
+    norms = np.linalg.norm(jacobian, axis=0)
+    norms = np.where(norms > 1e-12 * norms.max(initial=1e-300), norms, np.inf)
+    scaled = jacobian / norms
+    r = np.linalg.qr(np.column_stack([scaled, rest]), mode="r")
+    _, values, right = np.linalg.svd(r[:, :-1], full_matrices=False)
+    seen = values > _RANK * values[0]
+    projected = right @ (r[:, :-1].T @ r[:, -1])
+    step = right[seen].T @ (projected[seen] / values[seen] ** 2)
+    return step / norms, norms, values, right
+
+
+def solve(
+    blocks: tuple[Block, ...],
+    noises: list[NoiseModel],
+    joints: int,
+    free_scales: FloatArray,
+    start: tuple[FloatArray, FloatArray] | None = None,
+) -> Solution:
+    """Fit parameters and torque-constant scales.
+
+    Args:
+        blocks: averaged rows.
+        noises: noise per sample of each block.
+        joints: number of joints n.
+        free_scales: joints whose torque constant is unknown, shape (k,).
+        start: parameters and scales to start from.
+
+    Returns:
+        The solution with its covariance.
+
+    Source:
+        Markov estimate (Phi' S^-1 Phi)^-1, Verdonck, Swevers, Samin 2001, section 5.
+    """
+    parameters = blocks[0].columns.shape[1]
+    theta, scale = start if start is not None else (np.zeros(parameters), np.ones(joints))
+    scale = scale.copy()
+    free = np.asarray(free_scales, dtype=int)
+    if start is None:
+        jacobian, rest = _whitened_system(blocks, noises, theta, scale, free[:0])
+        theta = theta + _step(jacobian, rest)[0]
+    for _ in range(_ITERATIONS):
+        jacobian, rest = _whitened_system(blocks, noises, theta, scale, free)
+        step, norms, _, _ = _step(jacobian, rest)
+        theta, scale = theta + step[:parameters], scale.copy()
+        scale[free] += step[parameters:]
+        size = np.linalg.norm(np.where(np.isfinite(norms), norms, 0.0) * step)
+        if len(free) == 0 or size < _CONVERGED * max(np.linalg.norm(rest), 1.0):
+            break
+    return _summarise(blocks, noises, theta, scale, free)
+
+
+def _summarise(
+    blocks: tuple[Block, ...], noises: list[NoiseModel], theta: FloatArray, scale: FloatArray, free: FloatArray
+) -> Solution:
+    jacobian, rest = _whitened_system(blocks, noises, theta, scale, free)
+    _, norms, values, right = _step(jacobian, rest)
+    seen = values > _RANK * values[0]
+    inverse_norms = np.where(np.isfinite(norms), 1.0 / norms, 0.0)
+    root = (right[seen] / values[seen, None]) * inverse_norms
+    null_space = right[~seen].T
+    identifiable = (np.linalg.norm(null_space, axis=1) < _TOUCHED) & np.isfinite(norms)
+    return Solution(
+        theta,
+        scale,
+        free,
+        root.T @ root,
+        identifiable,
+        null_space,
+        float(rest @ rest),
+        int(seen.sum()),
+        sum(block.rows for block in blocks),
+        float(values[0] / values[seen][-1]),
+        jacobian,
+        rest,
+    )
