@@ -1,0 +1,105 @@
+"""Does the model fit? Lack of fit against replicate noise, and a covariance that survives a misfit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from identify.blocks import Block
+from identify.noise import NoiseModel
+from identify.rotations import FloatArray
+from identify.solve import Solution
+
+# a misfit at this level makes intervals that ignore it untrustworthy
+SIGNIFICANT = 0.01
+# misfits of friction and drives stay correlated over some hundredths of the recording
+_CORRELATED_SHARE = 25
+
+
+@dataclass(frozen=True)
+class LackOfFit:
+    """Omnibus test of the residual against the scatter between periods.
+
+    Attributes:
+        chi2: weighted sum of squares of the averaged residual.
+        dof: its degrees of freedom.
+        p: probability of such a misfit by noise alone.
+        reason: why there is no test, empty where there is one.
+    """
+
+    chi2: float | None
+    dof: int | None
+    p: float | None
+    reason: str = ""
+
+    @property
+    def fits(self) -> bool:
+        """Whether the model passes the test."""
+        return self.p is not None and self.p >= SIGNIFICANT
+
+
+def lack_of_fit(solution: Solution, noises: list[NoiseModel]) -> LackOfFit:
+    """Compare the averaged residual with replicate noise.
+
+    Args:
+        solution: the fit.
+        noises: noise of each block.
+
+    Returns:
+        The test; without replicates only the reason why there is none.
+
+    Source:
+        Lack of fit with replicates: the weighted sum of squares over its degrees of freedom follows
+        F(dof, dof of the noise); Hotelling's correction for the estimated covariance.
+    """
+    if not all(noise.replicated for noise in noises):
+        return LackOfFit(None, None, None, "no replicates: the recording does not repeat, so noise and misfit cannot be told apart")
+    if solution.dof <= 0:
+        return LackOfFit(None, None, None, "no degrees of freedom are left")
+    channels = sum(len(noise.innovation) for noise in noises)
+    noise_dof = min(noise.dof for noise in noises)
+    chi2 = solution.chi2 * max(noise_dof - channels - 1.0, 1.0) / noise_dof
+    p = float(stats.f.sf(chi2 / solution.dof, solution.dof, channels * noise_dof))
+    return LackOfFit(chi2, solution.dof, p)
+
+
+def structured_covariance(blocks: tuple[Block, ...], solution: Solution) -> FloatArray:
+    """Covariance from the residual itself, valid when the residual is structured.
+
+    Args:
+        blocks: averaged rows, for their shapes.
+        solution: the fit with whitened Jacobian and residual.
+
+    Returns:
+        Sandwich covariance of (theta, free scales) on the identifiable directions, shape (P + k, P + k).
+
+    Source:
+        Newey and West, Econometrica 55 (1987): Bartlett weights over the scores' autocovariance.
+    """
+    size, first = solution.jacobian.shape[1], 0
+    meat = np.zeros((size, size))
+    for block in blocks:
+        channels, count = block.target.shape
+        rows = slice(first, first + channels * count)
+        scores = (solution.jacobian[rows] * solution.whitened[rows, None]).reshape(channels, count, size).sum(axis=0)
+        meat += _bartlett(scores, max(count // _CORRELATED_SHARE, 2))
+        first += channels * count
+    return solution.covariance @ meat @ solution.covariance
+
+
+def _bartlett(scores: FloatArray, lags: int) -> FloatArray:
+    """Long-run covariance of periodic scores (B, P), positive semidefinite by construction."""
+    count = len(scores)
+    taper = np.zeros(count)
+    taper[: lags + 1] = 1.0 - np.arange(lags + 1) / (lags + 1.0)
+    taper[-lags:] += taper[1 : lags + 1][::-1]
+    weights = np.maximum(np.fft.rfft(taper).real, 0.0)
+    spectrum = np.fft.rfft(scores, axis=0)
+    twice = np.full(len(weights), 2.0)
+    twice[0] = 1.0
+    if count % 2 == 0:
+        twice[-1] = 1.0
+    weighted = spectrum * (weights * twice / count)[:, None]
+    return (spectrum.conj().T @ weighted).real
