@@ -19,7 +19,7 @@ _ENCODINGS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 _NUMBERS = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
-}  # fmt: skip
+}
 
 
 class CdrError(ValueError):
@@ -56,7 +56,7 @@ class Layout:
         shapes = [slot.dtype if slot.count is None else (slot.dtype, (slot.count,))
                   for slot in self.slots.values()]
         return np.dtype({"names": list(self.slots), "formats": shapes, "itemsize": self.size,
-                         "offsets": [slot.offset for slot in self.slots.values()]})  # fmt: skip
+                         "offsets": [slot.offset for slot in self.slots.values()]})
 
 
 class _Walker:

@@ -126,7 +126,7 @@ def _joint_states_topic(log: LogFile, there: dict[str, str], warnings: list[str]
         return others[0]
     if others:
         raise DataError(f"{log.source} holds joint states on {' and '.join(sorted(others))} but none on "
-                        f"{JOINT_STATES_TOPIC}; choose one with `residuum import --map`.")  # fmt: skip
+                        f"{JOINT_STATES_TOPIC}; choose one with `residuum import --map`.")
     raise MissingTopicError(log.source, JOINT_STATES_TOPIC, tuple(sorted(there)))
 
 
@@ -135,7 +135,7 @@ def _mention_other_wrenches(there: dict[str, str], warnings: list[str]) -> None:
     others = sorted(topic for topic, schema in there.items() if schema == WRENCH)
     if others:
         warnings.append(f"the wrench on {', '.join(others)} is not used: if it is the force plate under the "
-                        f"base, map it to {WRENCH_TOPIC} with `residuum import`")  # fmt: skip
+                        f"base, map it to {WRENCH_TOPIC} with `residuum import`")
 
 
 def _stamps(table: Table) -> np.ndarray:
@@ -159,7 +159,7 @@ def _stream(log: LogFile, topic: str, as_topic: str, warnings: list[str]) -> Str
         frame_id=_frame(table, warnings),
         stamp_ns=stamps if kept.all() else stamps[kept],
         log_time_ns=headers["log_time"].astype(np.int64),
-        sequence=_sequence(headers, topic, warnings),
+        sequence=_sequence(headers, as_topic, warnings),
         data=data,
     )
 
@@ -168,7 +168,7 @@ def _frame(table: Table, warnings: list[str]) -> str:
     frames = list(dict.fromkeys(str(batch.texts["header.frame_id"]) for batch in table.batches))
     if len(frames) > 1:
         warnings.append(f"{table.topic} changes its frame_id ({', '.join(map(repr, frames))}); "
-                        f"the first is kept")  # fmt: skip
+                        f"the first is kept")
     return frames[0]
 
 
@@ -206,7 +206,7 @@ def _joint_columns(
         data[key] = _merge(log, table.topic, key, names, filled, slot, int(kept.sum()))
     if _KEYS[table.schema][0] not in data:
         raise DataError(f"{log.source}: {table.topic} has messages but their "
-                        f"{_KEYS[table.schema][0]} arrays are empty; record them too.")  # fmt: skip
+                        f"{_KEYS[table.schema][0]} arrays are empty; record them too.")
     return names, kept, data
 
 
@@ -223,11 +223,11 @@ def _one_set_of_joints(
     names = _names(log, table, first)
     if count < len(table.headers):
         warnings.append(f"{table.topic}: {len(table.headers) - count} messages name other joints than "
-                        f"{', '.join(names)} and are left out")  # fmt: skip
+                        f"{', '.join(names)} and are left out")
     moved = sum(len(batch.rows) for batch in batches if _names(log, table, batch) != names)
     if moved:
         warnings.append(f"{table.topic}: {moved} messages list the joints in another order than the first; "
-                        f"they were put into its order")  # fmt: skip
+                        f"they were put into its order")
     return names, batches
 
 
@@ -238,21 +238,21 @@ def _names(log: LogFile, table: Table, batch: Batch) -> tuple[str, ...]:
         return tuple(f"joint_{i + 1}" for i in range(width))
     if len(set(names)) < len(names):
         raise DataError(f"{log.source}: {table.topic} names a joint twice ({', '.join(names)}); "
-                        "give every joint its own name where the log is written.")  # fmt: skip
+                        "give every joint its own name where the log is written.")
     return names
 
 
 def _merge(
     log: LogFile, topic: str, key: str, names: tuple[str, ...], batches: list[Batch],
     slot: np.ndarray, count: int,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """(n, k) numbers of all batches in one joint order; rows no batch has are NaN."""
     out = np.full((count, len(names)), np.nan)
     for batch in batches:
         values = batch.columns[key]
         if values.shape[1] != len(names):
             raise DataError(f"{log.source}: {topic} names {len(names)} joints but its {key} has "
-                            f"{values.shape[1]} values (message {int(batch.rows[0])}).")  # fmt: skip
+                            f"{values.shape[1]} values (message {int(batch.rows[0])}).")
         own = tuple(batch.texts["name"]) or names
         order = [own.index(name) for name in names]
         out[slot[batch.rows]] = values if order == list(range(len(names))) else values[:, order]

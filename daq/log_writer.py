@@ -85,18 +85,18 @@ class LogWriter:
     def write_joint_states(
         self, stamp_ns: int, log_time_ns: int, sequence: int, names: Sequence[str], position: Numbers,
         velocity: Numbers | None = None, effort: Numbers | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Log where the joints were: rad (m), rad/s (m/s), N.m (N), joint side."""
         self._write_joints(JOINT_STATES_TOPIC, (stamp_ns, log_time_ns, sequence), names,
-                           {"position": position, "velocity": velocity, "effort": effort})  # fmt: skip
+                           {"position": position, "velocity": velocity, "effort": effort})
 
     def write_setpoints(
         self, stamp_ns: int, log_time_ns: int, sequence: int, names: Sequence[str], position: Numbers,
         velocity: Numbers | None = None, effort: Numbers | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Log what was commanded, in the units of the joint states."""
         self._write_joints(SETPOINTS_TOPIC, (stamp_ns, log_time_ns, sequence), names,
-                           {"position": position, "velocity": velocity, "effort": effort})  # fmt: skip
+                           {"position": position, "velocity": velocity, "effort": effort})
 
     def write_motor_currents(
         self, stamp_ns: int, log_time_ns: int, sequence: int, names: Sequence[str], current: Numbers
@@ -110,7 +110,7 @@ class LogWriter:
         """Log what the plate exerts on the robot [N, N.m], in the plate's frame about its origin."""
         found = self._template(WRENCH_TOPIC, {"header.frame_id": FRAMES[WRENCH_TOPIC]}, {})
         self._append(found, (stamp_ns, log_time_ns, sequence),
-                     {"wrench.force": force, "wrench.torque": torque})  # fmt: skip
+                     {"wrench.force": force, "wrench.torque": torque})
 
     def write_raw(
         self, topic: str, stamp_ns: int, log_time_ns: int, sequence: int, **values: object
@@ -181,7 +181,7 @@ class LogWriter:
     def _write_joints(
         self, topic: str, when: tuple[int, int, int], names: Sequence[str],
         values: Mapping[str, Numbers | None],
-    ) -> None:  # fmt: skip
+    ) -> None:
         names = tuple(names)
         key = (topic, names, *(value is not None for value in values.values()))
         found = self._templates.get(key)

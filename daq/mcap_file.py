@@ -35,7 +35,7 @@ _MESSAGE = np.dtype({
     "formats": ["u1", "<u8", "<u2", "<u4", "<u8", "<u8"],
     "offsets": [0, 1, 9, 11, 15, 23],
     "itemsize": MESSAGE_HEADER,
-})  # fmt: skip
+})
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def open_log(path: str | Path) -> LogFile:
     warnings = _oddities(pieces)
     return LogFile(str(path), pieces.profile, pieces.schemas, pieces.channels, pieces.metadata,
                    pieces.attachments, buffer, offsets, headers, hashlib.sha256(raw).hexdigest(),
-                   warnings)  # fmt: skip
+                   warnings)
 
 
 def _oddities(pieces: _Pieces) -> tuple[str, ...]:
@@ -277,7 +277,7 @@ def _find_messages(pieces: _Pieces, buffer: np.ndarray) -> tuple[np.ndarray, np.
     missing = used_channels(headers) - set(pieces.channels)
     if missing:
         raise DataError(f"{pieces.source}: messages refer to channel {min(missing)}, which the log does not "
-                        f"describe; `residuum recover` keeps the other topics.")  # fmt: skip
+                        f"describe; `residuum recover` keeps the other topics.")
     return offsets, headers
 
 

@@ -19,7 +19,7 @@ from daq.mcap_records import MAGIC, Op, map_bytes, record, text_bytes
 PARTIAL_SUFFIX = ".partial"
 LIBRARY = "residuum"
 _MEDIA_TYPES = {".json": "application/json", ".toml": "application/toml", ".urdf": "application/xml",
-                ".xml": "application/xml"}  # fmt: skip
+                ".xml": "application/xml"}
 
 
 class McapWriter:
@@ -41,7 +41,7 @@ class McapWriter:
         self._channels: list[bytes] = []
         self._counts: dict[int, int] = {}
         self._summary: dict[int, list[bytes]] = {Op.CHUNK_INDEX: [], Op.ATTACHMENT_INDEX: [],
-                                                 Op.METADATA_INDEX: []}  # fmt: skip
+                                                 Op.METADATA_INDEX: []}
         self._first, self._last = 2**64 - 1, 0
         self._put(MAGIC + record(Op.HEADER, text_bytes("ros2") + text_bytes(LIBRARY)))
 
@@ -58,7 +58,7 @@ class McapWriter:
         except OSError as error:
             raise HardwareError(f"writing {self.partial} failed at byte {start}: "
                                 f"{error.strerror or error}; free the disk, then `residuum recover` what "
-                                f"was written.") from error  # fmt: skip
+                                f"was written.") from error
         self._crc = zlib.crc32(data, self._crc)
         self._at += len(data)
         return start
@@ -151,13 +151,13 @@ class McapWriter:
         self._put(record(Op.DATA_END, struct.pack("<I", self._crc)))
         start = self._at
         groups = {Op.SCHEMA: self._schemas, Op.CHANNEL: self._channels,
-                  Op.STATISTICS: [self._statistics()], **self._summary}  # fmt: skip
+                  Op.STATISTICS: [self._statistics()], **self._summary}
         summary, offsets = b"", b""
         for opcode, records in groups.items():
             group = b"".join(records)
             if group:
                 offsets += record(Op.SUMMARY_OFFSET, struct.pack("<BQQ", opcode, start + len(summary),
-                                                                 len(group)))  # fmt: skip
+                                                                 len(group)))
             summary += group
         footer = struct.pack("<BQQQ", Op.FOOTER, 20, start, start + len(summary))
         body = summary + offsets + footer
@@ -172,7 +172,7 @@ class McapWriter:
             "<QHIIII", sum(self._counts.values()), len(self._schemas), len(self._channels),
             len(self._summary[Op.ATTACHMENT_INDEX]), len(self._summary[Op.METADATA_INDEX]),
             len(self._summary[Op.CHUNK_INDEX]),
-        )  # fmt: skip
+        )
         times = struct.pack("<QQ", self._first if self._last else 0, self._last)
         return record(Op.STATISTICS, body + times + struct.pack("<I", len(counts)) + counts)
 
@@ -188,7 +188,7 @@ def _create(partial: Path):  # noqa: ANN202 - a BufferedWriter
         return open(partial, "xb", buffering=1 << 18)
     except FileExistsError as error:
         raise UsageError(f"{partial} exists: an unfinished log lies there; `residuum recover {partial} -o "
-                         f"whole.mcap` saves it, then delete it.") from error  # fmt: skip
+                         f"whole.mcap` saves it, then delete it.") from error
     except OSError as error:
         raise UsageError(f"cannot write {partial}: {error.strerror or error}; "
-                         f"choose a folder that exists and that you may write to.") from error  # fmt: skip
+                         f"choose a folder that exists and that you may write to.") from error

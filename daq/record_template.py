@@ -18,7 +18,7 @@ _STAMP = struct.Struct("<iI")
 _STAMP_AT = MESSAGE_HEADER + 4
 # numpy's own letters depend on the platform: its "l" has 8 bytes, the standard one of struct 4
 _LETTERS = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
-            "f4": "f", "f8": "d"}  # fmt: skip
+            "f4": "f", "f8": "d"}
 _SECOND_NS = 1_000_000_000
 
 
@@ -42,7 +42,8 @@ class RecordTemplate:
         self._record = bytearray(head + message)
         self._groups = _groups(layout)
         self._packers = [
-            (name, MESSAGE_HEADER + offset, struct.Struct(f"<{count or 1}{_LETTERS[dtype.str[1:]]}"), count is None)
+            (name, MESSAGE_HEADER + offset,
+             struct.Struct(f"<{count or 1}{_LETTERS[dtype.str[1:]]}"), count is None)
             for name, (offset, dtype, count) in self._groups.items()
         ]
 
@@ -63,13 +64,13 @@ class RecordTemplate:
                 packer.pack_into(out, offset, *((value,) if scalar else value))  # type: ignore[misc]
         except (struct.error, KeyError, TypeError) as error:
             raise UsageError(f"a {self.schema} message cannot be written ({error!s}); "
-                             f"it needs {', '.join(self._groups) or 'no numbers'}.") from error  # fmt: skip
+                             f"it needs {', '.join(self._groups) or 'no numbers'}.") from error
         return out
 
     def rows(
         self, stamp_ns: np.ndarray, log_time_ns: np.ndarray, sequence: np.ndarray,
         values: Mapping[str, np.ndarray],
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """All records of a stream at once: (n, bytes) uint8."""
         size = len(self._record)
         names, formats, offsets = ["sequence", "log", "publish", "sec", "nanosec"], [], [11, 15, 23, 35, 39]

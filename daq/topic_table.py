@@ -84,7 +84,7 @@ def read_table(log: LogFile, topic: str) -> Table:
             batches += _batches_of_size(log.buffer, offsets[rows], rows, int(size), schema)
     except CdrError as error:
         raise DataError(f"{log.source}: {topic} does not hold {schema} messages in CDR: {error}; the program "
-                        f"that wrote the log is at fault.") from error  # fmt: skip
+                        f"that wrote the log is at fault.") from error
     return Table(topic, schema, headers, tuple(batches))
 
 
