@@ -44,7 +44,9 @@ class Framer:
 
     A candidate that fails its check costs one byte, never a frame length, so a cut frame or an anchor
     inside a payload cannot hide the intact frame behind it. Where two intact candidates overlap, the one
-    that more frames follow back to back is taken; this waits for at most three frames more.
+    that more frames follow back to back is taken; this waits for at most three frames more. A frame that
+    directly follows an intact one and passes a strong check is taken at once; should the stream then fall
+    out of step, frames that began inside it are taken too, so that nothing intact is ever dropped.
     """
 
     def __init__(self, frame_format: FrameFormat) -> None:
@@ -52,7 +54,7 @@ class Framer:
         self._buffer = bytearray()
         self._in_step = False
         self._frames = self._skipped = self._refused = self._overlaps = 0
-        self._judged = 0
+        self._judged = self._unread = 0
 
     @property
     def counts(self) -> FramingCounts:
@@ -70,26 +72,54 @@ class Framer:
 
     def _cut(self, at_end: bool) -> list[bytes]:
         frames: list[bytes] = []
-        position = 0
         length = self._format.length
-        while True:
-            start = self._next_intact(position)
-            if start is None:
-                position = self._skip(position, self._tail_start(position))
-                break
-            if not (self._format.is_strong and self._in_step and start == position):
-                chosen = self._settle(start, at_end)
-                if chosen is None:
-                    position = self._skip(position, start)
-                    break
-                start = chosen
+        position = self._unread
+        while (start := self._next_frame(position, at_end)) is not None:
             self._skip(position, start)
             frames.append(bytes(self._buffer[start : start + length]))
             position, self._in_step = start + length, True
-        del self._buffer[:position]
-        self._judged = max(self._judged - position, 0)
+        if not self._must_wait_in_step(position, at_end):
+            position = self._skip(position, self._wait_from(position))
+        # The last frame is kept: should it prove a phantom, an intact frame may begin inside it.
+        self._unread = min(position, length) if self._in_step else 0
+        dropped = position - self._unread
+        del self._buffer[:dropped]
+        self._judged = max(self._judged - dropped, 0)
         self._frames += len(frames)
         return frames
+
+    def _next_frame(self, position: int, at_end: bool) -> int | None:
+        """Return the start of the frame to take next; None when more bytes are needed."""
+        start = self._next_intact(position)
+        if self._in_step and self._format.is_strong:
+            if start == position:
+                return start
+            if self._must_wait_in_step(position, at_end):
+                return None
+            hidden = self._hidden_in_last_frame(position)
+            if hidden is not None:
+                self._overlaps += 1
+                return hidden
+        return start if start is None else self._settle(start, at_end)
+
+    def _must_wait_in_step(self, position: int, at_end: bool) -> bool:
+        """Whether it is still open if an intact frame follows directly on the last one."""
+        is_open = len(self._buffer) < position + self._format.length
+        return self._in_step and self._format.is_strong and is_open and not at_end
+
+    def _hidden_in_last_frame(self, position: int) -> int | None:
+        """Return an intact frame that began inside the last one: that was a phantom, a cut frame's head."""
+        start = self._candidate(max(position - self._format.length, 0) + 1)
+        while start is not None and start < position:
+            if self._is_intact(start):
+                return start
+            start = self._candidate(start + 1)
+        return None
+
+    def _wait_from(self, position: int) -> int:
+        """Return the first byte that is still needed: an unsettled candidate or a possible frame's head."""
+        start = self._next_intact(position)
+        return self._tail_start(position) if start is None else start
 
     def _skip(self, position: int, target: int) -> int:
         if target > position:
