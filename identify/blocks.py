@@ -8,6 +8,7 @@ import numpy as np
 
 from identify.dataset import Dataset, Signal
 from identify.errors import UnusableDataError
+from identify.filters import AntiAliasFilter
 from identify.fourier import FourierTrajectory
 from identify.model import Model, Rows
 from identify.noise import NoiseModel, noise_from_scatter
@@ -106,7 +107,7 @@ def _collect(
 ) -> tuple[Samples, FloatArray]:
     """Evaluate the model at every sample's own instant; also mark rows whose sign is unknown."""
     cut = signal.between(window.start_s, window.stop_s)
-    bins = max(int(round(signal.rate_hz * window.period_s)), 4)
+    bins = _bins(signal, window)
     order, place, period, t = _sorted_samples(cut, window, bins)
     q, qd, qdd = trajectory.evaluate(t)
     rows = model.drive_rows(q, qd, qdd) if drives else model.wrench_rows(q, qd, qdd)
@@ -124,17 +125,28 @@ def _average(values: FloatArray, place: FloatArray, bins: int) -> FloatArray:
 
 
 def _to_block(
-    samples: Samples, unknown: FloatArray, channels: tuple[str, ...], joint: FloatArray, window: PeriodWindow, bins: int
+    samples: Samples,
+    unknown: FloatArray,
+    channels: tuple[str, ...],
+    joint: FloatArray,
+    window: PeriodWindow,
+    bins: int,
+    anti_alias: AntiAliasFilter | None,
 ) -> Block:
     counts = np.bincount(samples.bin, minlength=bins)
     usable = np.broadcast_to(counts * 2 > window.periods, (len(channels), bins)) & (
         _average(unknown.astype(float), samples.bin, bins) == 0.0
     )
+    columns = _average(samples.rows.columns, samples.bin, bins)
+    known = _average(samples.rows.known, samples.bin, bins)
+    if anti_alias is not None:  # the model goes through the filter the measurement went through
+        columns = anti_alias.apply_periodic(columns, window.period_s)
+        known = anti_alias.apply_periodic(known, window.period_s)
     return Block(
         channels,
         joint,
-        _average(samples.rows.columns, samples.bin, bins),
-        _average(samples.rows.known, samples.bin, bins),
+        columns,
+        known,
         _average(samples.target, samples.bin, bins),
         usable,
         window.periods,
@@ -173,8 +185,8 @@ def periodic_rows(model: Model, data: Dataset, window: PeriodWindow, trajectory:
     if model.kind != "external":
         signal = nominal_torque(model, data)
         samples, unknown = _collect(model, trajectory, signal, window, drives=True)
-        joints = np.arange(model.robot.n)
-        parts.append((samples, _to_block(samples, unknown, model.robot.joint_names, joints, window, _bins(signal, window))))
+        names, joints, anti_alias = model.robot.joint_names, np.arange(model.robot.n), data.filters.get("current")
+        parts.append((samples, _to_block(samples, unknown, names, joints, window, _bins(signal, window), anti_alias)))
     if model.kind != "internal":
         if data.wrench is None:
             raise UnusableDataError(
@@ -182,8 +194,8 @@ def periodic_rows(model: Model, data: Dataset, window: PeriodWindow, trajectory:
                 "choose --model internal."
             )
         samples, unknown = _collect(model, trajectory, data.wrench, window, drives=False)
-        none = np.full(6, -1)
-        parts.append((samples, _to_block(samples, unknown, WRENCH_CHANNELS, none, window, _bins(data.wrench, window))))
+        none, anti_alias, bins = np.full(6, -1), data.filters.get("wrench"), _bins(data.wrench, window)
+        parts.append((samples, _to_block(samples, unknown, WRENCH_CHANNELS, none, window, bins, anti_alias)))
     if len(parts) == 2 and parts[0][1].target.shape[1] == parts[1][1].target.shape[1]:
         return PeriodicRows((_stack(parts[0][1], parts[1][1]),), ((parts[0][0], parts[1][0]),))
     return PeriodicRows(tuple(block for _, block in parts), tuple((samples,) for samples, _ in parts))

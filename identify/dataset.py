@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from identify.filters import AntiAliasFilter
 from identify.rotations import FloatArray
 
 
@@ -62,6 +64,7 @@ class Dataset:
         kind: ``excitation``, ``validation``, ``free`` or empty.
         simulated: whether the log says it is simulated.
         source: where it comes from, for messages.
+        filters: anti-alias filters by stream: ``position``, ``current``, ``wrench``.
     """
 
     position: Signal
@@ -72,6 +75,7 @@ class Dataset:
     kind: str = ""
     simulated: bool = False
     source: str = "the recording"
+    filters: Mapping[str, AntiAliasFilter] = field(default_factory=dict)
 
     @property
     def drive_signal(self) -> Signal | None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identify.dataset import Signal
+from identify.filters import AntiAliasFilter
 from identify.period import PeriodWindow
 from identify.rotations import FloatArray
 
@@ -159,6 +160,15 @@ def _lines_above_noise(spectra: FloatArray, first: FourierTrajectory, joint: int
     mean[first.lines] += 0.5 * (first.cosine[joint] - 1j * first.sine[joint])
     threshold = -np.log(_FALSE_LINE)  # |line|^2 / variance of the mean is exponential under noise
     return np.abs(mean) ** 2 > threshold * np.maximum(floor / periods, 1e-32)
+
+
+def unfiltered(trajectory: FourierTrajectory, anti_alias: AntiAliasFilter | None) -> FourierTrajectory:
+    """Undo the encoder stream's filter line by line (division by its complex gain)."""
+    if anti_alias is None:
+        return trajectory
+    gain = anti_alias.response(trajectory.lines / trajectory.period_s)
+    lines = (trajectory.cosine - 1j * trajectory.sine) / gain
+    return replace(trajectory, cosine=lines.real, sine=-lines.imag)
 
 
 def fit_trajectory(position: Signal, window: PeriodWindow, excited: int | None = None) -> FourierTrajectory:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.blocks import Block, predict, residual
-from identify.noise import NoiseModel
+from identify.noise import NoiseModel, circular_filter
 from identify.rotations import FloatArray
 
 _ITERATIONS = 30
@@ -92,14 +92,65 @@ def _step(jacobian: FloatArray, rest: FloatArray) -> tuple[FloatArray, FloatArra
     return step / norms, norms, values, right
 
 
-def solve(
+@dataclass(frozen=True)
+class _Gram:
+    """Inner products of one block's time-whitened columns: rows of the problem are needed only once.
+
+    Attributes:
+        products: of (columns, known, target) between channels, shape (c, P + 2, c, P + 2).
+        weight: inverse innovation covariance, shape (c, c).
+        joint: joint of each channel or -1, shape (c,).
+    """
+
+    products: FloatArray
+    weight: FloatArray
+    joint: FloatArray
+
+
+def _gram(block: Block, noise: NoiseModel) -> _Gram:
+    stacked = np.concatenate([block.columns, block.known[:, None], block.target[:, None]], axis=1)
+    stacked *= np.sqrt(block.repeats) * block.usable[:, None, :]
+    filtered = np.stack([circular_filter(taps, part) for taps, part in zip(noise.filters, stacked, strict=True)])
+    flat = filtered.reshape(-1, filtered.shape[2])
+    shape = filtered.shape[:2]
+    return _Gram((flat @ flat.T).reshape(*shape, *shape), np.linalg.inv(noise.innovation), block.joint)
+
+
+def _normal_step(
+    grams: list[_Gram], theta: FloatArray, scale: FloatArray, free: FloatArray
+) -> tuple[FloatArray, float]:
+    """One Gauss-Newton step from inner products; also the relative size of the step."""
+    size, parameters = len(theta) + len(free), len(theta)
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    for gram in grams:
+        factors = np.where(gram.joint >= 0, scale[np.maximum(gram.joint, 0)], 1.0)
+        maps = np.zeros((len(factors), parameters + 2, size))  # Jacobian of a channel = its columns @ map
+        rests = np.concatenate([-factors[:, None] * theta, -factors[:, None], np.ones((len(factors), 1))], axis=1)
+        for channel, factor in enumerate(factors):
+            maps[channel, np.arange(parameters), np.arange(parameters)] = factor
+            for column in np.flatnonzero(free == gram.joint[channel]):
+                maps[channel, :parameters, parameters + column] = theta
+                maps[channel, parameters, parameters + column] = 1.0
+        weighted = np.einsum("ab,apbq->apbq", gram.weight, gram.products)
+        toward = np.tensordot(weighted, maps, axes=([2, 3], [0, 1]))
+        normal += np.tensordot(maps, toward, axes=([0, 1], [0, 1]))
+        right += np.tensordot(toward, rests, axes=([0, 1], [0, 1]))
+    diagonal = np.sqrt(np.diag(normal))
+    inverse = np.where(diagonal > 1e-12 * diagonal.max(initial=1e-300), 1.0 / np.maximum(diagonal, 1e-300), 0.0)
+    values, vectors = np.linalg.eigh(normal * np.outer(inverse, inverse))
+    seen = values > 1e-14 * values[-1]  # squared singular values: rounding, the last step settles the rank
+    step = vectors[:, seen] @ ((vectors[:, seen].T @ (right * inverse)) / values[seen])
+    return inverse * step, float(np.linalg.norm(step))
+
+
+def refine(
     blocks: tuple[Block, ...],
     noises: list[NoiseModel],
     joints: int,
     free_scales: FloatArray,
     start: tuple[FloatArray, FloatArray] | None = None,
-) -> Solution:
-    """Fit parameters and torque-constant scales.
+) -> tuple[FloatArray, FloatArray]:
+    """Find parameters and scales by Gauss-Newton steps on inner products (no covariance).
 
     Args:
         blocks: averaged rows.
@@ -109,33 +160,61 @@ def solve(
         start: parameters and scales to start from.
 
     Returns:
-        The solution with its covariance.
+        Parameters (P,) and scales (n,).
+    """
+    grams = [_gram(block, noise) for block, noise in zip(blocks, noises, strict=True)]
+    free = np.asarray(free_scales, dtype=int)
+    theta, scale = start if start is not None else (np.zeros(blocks[0].columns.shape[1]), np.ones(joints))
+    scale = scale.copy()
+    theta = theta + _normal_step(grams, theta, scale, free[:0])[0]
+    for _ in range(_ITERATIONS if len(free) else 1):
+        step, size = _normal_step(grams, theta, scale, free)
+        theta = theta + step[: len(theta)]
+        scale[free] += step[len(theta) :]
+        if size < _CONVERGED * np.sqrt(sum(block.rows for block in blocks)):
+            break
+    return theta, scale
+
+
+def solve(
+    blocks: tuple[Block, ...],
+    noises: list[NoiseModel],
+    joints: int,
+    free_scales: FloatArray,
+    start: tuple[FloatArray, FloatArray] | None = None,
+) -> Solution:
+    """Fit parameters and torque-constant scales, with their covariance.
+
+    Args:
+        blocks: averaged rows.
+        noises: noise per sample of each block.
+        joints: number of joints n.
+        free_scales: joints whose torque constant is unknown, shape (k,).
+        start: parameters and scales to start from.
+
+    Returns:
+        The solution; its last step is an orthogonal factorisation of the rows themselves.
 
     Source:
         Markov estimate (Phi' S^-1 Phi)^-1, Verdonck, Swevers, Samin 2001, section 5.
     """
-    parameters = blocks[0].columns.shape[1]
-    theta, scale = start if start is not None else (np.zeros(parameters), np.ones(joints))
-    scale = scale.copy()
     free = np.asarray(free_scales, dtype=int)
-    if start is None:
-        jacobian, rest = _whitened_system(blocks, noises, theta, scale, free[:0])
-        theta = theta + _step(jacobian, rest)[0]
-    for _ in range(_ITERATIONS):
-        jacobian, rest = _whitened_system(blocks, noises, theta, scale, free)
-        step, norms, _, _ = _step(jacobian, rest)
-        theta, scale = theta + step[:parameters], scale.copy()
-        scale[free] += step[parameters:]
-        size = np.linalg.norm(np.where(np.isfinite(norms), norms, 0.0) * step)
-        if len(free) == 0 or size < _CONVERGED * max(np.linalg.norm(rest), 1.0):
-            break
-    return _summarise(blocks, noises, theta, scale, free)
+    theta, scale = refine(blocks, noises, joints, free, start)
+    jacobian, rest = _whitened_system(blocks, noises, theta, scale, free)
+    step = _step(jacobian, rest)[0]
+    theta, scale = theta + step[: len(theta)], scale.copy()
+    scale[free] += step[len(theta) :]
+    return _summarise(blocks, theta, scale, free, (jacobian, rest - jacobian @ step))
 
 
 def _summarise(
-    blocks: tuple[Block, ...], noises: list[NoiseModel], theta: FloatArray, scale: FloatArray, free: FloatArray
+    blocks: tuple[Block, ...],
+    theta: FloatArray,
+    scale: FloatArray,
+    free: FloatArray,
+    system: tuple[FloatArray, FloatArray],
 ) -> Solution:
-    jacobian, rest = _whitened_system(blocks, noises, theta, scale, free)
+    jacobian, rest = system
     _, norms, values, right = _step(jacobian, rest)
     seen = values > _RANK * values[0]
     inverse_norms = np.where(np.isfinite(norms), 1.0 / norms, 0.0)
