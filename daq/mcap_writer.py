@@ -63,20 +63,20 @@ class McapWriter:
         self._at += len(data)
         return start
 
-    def add_schema(self, name: str, text: str) -> int:
+    def add_schema(self, name: str, text: str, encoding: str = "ros2msg") -> int:
         """Declare a message type; returns its id."""
         number = len(self._schemas) + 1
         raw = text.encode()
-        body = struct.pack("<H", number) + text_bytes(name) + text_bytes("ros2msg")
+        body = struct.pack("<H", number) + text_bytes(name) + text_bytes(encoding)
         self._schemas.append(record(Op.SCHEMA, body + struct.pack("<I", len(raw)) + raw))
         self._put(self._schemas[-1])
         return number
 
-    def add_channel(self, topic: str, schema: int) -> int:
+    def add_channel(self, topic: str, schema: int, encoding: str = "cdr") -> int:
         """Declare a topic; returns its channel id."""
         number = len(self._channels) + 1
-        body = struct.pack("<HH", number, schema) + text_bytes(topic) + text_bytes("cdr") + map_bytes({})
-        self._channels.append(record(Op.CHANNEL, body))
+        body = struct.pack("<HH", number, schema) + text_bytes(topic) + text_bytes(encoding)
+        self._channels.append(record(Op.CHANNEL, body + map_bytes({})))
         self._put(self._channels[-1])
         return number
 

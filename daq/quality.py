@@ -156,7 +156,8 @@ def _notes(
     for stream in streams:
         if stream.lost:
             notes.append(f"{stream.topic} lost {stream.lost} samples in {stream.gap_count} gaps "
-                         f"({stream.holes} by its own count), the longest {stream.gaps[0].length_s * 1e3:.3g} ms.")
+                         f"({stream.holes} by its own count), the longest "
+                         f"{stream.gaps[0].length_s * 1e3:.3g} ms.")
         if stream.saturated:
             notes.append(f"{stream.topic}: {_list(stream.saturated)} is clipped at its extreme: those "
                          f"samples hide the true value.")
