@@ -16,6 +16,7 @@ from identify.solve import Solution
 SIGNIFICANT = 0.01
 # misfits of friction and drives stay correlated over some hundredths of the recording
 _CORRELATED_SHARE = 25
+_REGIONS = 6  # of position and of speed: enough to follow a friction curve, few enough to add up
 
 
 @dataclass(frozen=True)
@@ -65,28 +66,51 @@ def lack_of_fit(solution: Solution, noises: list[NoiseModel]) -> LackOfFit:
     return LackOfFit(chi2, solution.dof, p)
 
 
-def structured_covariance(blocks: tuple[Block, ...], solution: Solution) -> FloatArray:
+def structured_covariance(
+    blocks: tuple[Block, ...], solution: Solution, motion: tuple[FloatArray, ...] | None
+) -> FloatArray:
     """Covariance from the residual itself, valid when the residual is structured.
 
+    A misfit of friction keeps its sign over a range of speeds, one of springs over a range of positions:
+    scores are therefore also summed over such regions, where a misfit adds up as it does in the estimate.
+
     Args:
-        blocks: averaged rows, for their shapes.
+        blocks: averaged rows.
         solution: the fit with whitened Jacobian and residual.
+        motion: for every block joint positions and speeds on its grid, shape (2, n, B).
 
     Returns:
         Sandwich covariance of (theta, free scales) on the identifiable directions, shape (P + k, P + k).
 
     Source:
-        Newey and West, Econometrica 55 (1987): Bartlett weights over the scores' autocovariance.
+        Newey and West, Econometrica 55 (1987): Bartlett weights over the scores' autocovariance;
+        Liang and Zeger, Biometrika 73 (1986): sums over clusters.
     """
     size, first = solution.jacobian.shape[1], 0
     meat = np.zeros((size, size))
-    for block in blocks:
+    for index, block in enumerate(blocks):
         channels, count = block.target.shape
         rows = slice(first, first + channels * count)
-        scores = (solution.jacobian[rows] * solution.whitened[rows, None]).reshape(channels, count, size).sum(axis=0)
-        meat += _bartlett(scores, max(count // _CORRELATED_SHARE, 2))
+        scores = (solution.jacobian[rows] * solution.whitened[rows, None]).reshape(channels, count, size)
+        meat += _bartlett(scores.sum(axis=0), max(count // _CORRELATED_SHARE, 2))
+        if motion is not None:
+            meat += _region_clusters(block, scores, motion[index])
         first += channels * count
     return solution.covariance @ meat @ solution.covariance
+
+
+def _region_clusters(block: Block, scores: FloatArray, motion: FloatArray) -> FloatArray:
+    """Outer products of scores summed over regions of each joint's position and speed, its own channel only."""
+    meat = np.zeros((scores.shape[2], scores.shape[2]))
+    for channel, joint in enumerate(block.joint):
+        if joint < 0:
+            continue
+        for variable in (motion[0, joint], np.abs(motion[1, joint])):
+            edges = np.quantile(variable, np.linspace(0.0, 1.0, _REGIONS + 1)[1:-1])
+            sums = np.zeros((_REGIONS, scores.shape[2]))
+            np.add.at(sums, np.searchsorted(edges, variable), scores[channel])
+            meat += sums.T @ sums * _REGIONS / (_REGIONS - 1)
+    return meat
 
 
 def _bartlett(scores: FloatArray, lags: int) -> FloatArray:

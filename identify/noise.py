@@ -45,6 +45,22 @@ class NoiseModel:
         root = np.linalg.inv(np.linalg.cholesky(self.innovation))
         return np.tensordot(root, filtered, axes=1)
 
+    def colour_adjoint(self, series: FloatArray) -> FloatArray:
+        """Apply the transpose of the noise's square root, so that x' S x = |colour_adjoint(x)|^2.
+
+        Args:
+            series: shape (c, P, N), the last axis time, taken as periodic.
+
+        Returns:
+            Array of the same shape.
+        """
+        count = series.shape[-1]
+        spectrum = np.fft.rfft(series, axis=-1)
+        for channel, taps in enumerate(self.filters):
+            spectrum[channel] /= np.conj(np.fft.rfft(taps, count))
+        root = np.linalg.cholesky(self.innovation)
+        return np.tensordot(root.T, np.fft.irfft(spectrum, count, axis=-1), axes=1)
+
     def spectrum_at_zero(self) -> FloatArray:
         """Noise power at zero frequency per channel: N times the variance of a mean of N samples."""
         gains = np.array([taps.sum() for taps in self.filters])
