@@ -273,12 +273,17 @@ def _find_messages(pieces: _Pieces, buffer: np.ndarray) -> tuple[np.ndarray, np.
     headers = _headers_if_complete(pieces, buffer, offsets)
     if headers is None:
         offsets = _stepped_offsets(pieces)
-        headers = gather(buffer, offsets, MESSAGE_HEADER).view(_MESSAGE)
+        headers = message_headers(buffer, offsets)
     missing = used_channels(headers) - set(pieces.channels)
     if missing:
         raise DataError(f"{pieces.source}: messages refer to channel {min(missing)}, which the log does not "
                         f"describe; `residuum recover` keeps the other topics.")
     return offsets, headers
+
+
+def message_headers(buffer: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """(n,) structured: channel, sequence, log_time, publish_time and length of the messages at offsets."""
+    return gather(buffer, offsets, MESSAGE_HEADER).view(_MESSAGE)
 
 
 def used_channels(headers: np.ndarray) -> set[int]:

@@ -91,19 +91,29 @@ def sample_numbers(stream: Stream, counted: bool) -> np.ndarray:
     whole = np.maximum(np.round(steps), 1)
     regular = np.median(np.abs(steps - whole)) < _REGULAR
     by_count = np.diff(unwrapped(stream.sequence)) if counted else np.ones(len(steps), np.int64)
-    best = np.maximum(by_count, whole) if regular else by_count
-    return np.concatenate([[0], np.cumsum(np.maximum(best, 1)).astype(np.int64)])
+    counted_numbers = np.concatenate([[0], np.cumsum(np.maximum(by_count, 1))]).astype(np.int64)
+    if not regular:
+        return counted_numbers
+    reckoned = np.concatenate([[0], np.cumsum(np.maximum(by_count, whole))]).astype(np.int64)
+    # a late stamp that the next ones catch up with is no loss: then the plain count fits the clock better
+    offset = (stream.stamp_ns - stream.stamp_ns[0]).astype(float)
+    return min((counted_numbers, reckoned), key=lambda numbers: float(np.std(_line(numbers, offset)[2])))
 
 
 def fit_clock(stream: Stream, counted: bool) -> ClockFit:
     """Regression of the stamps on the sample numbers."""
-    number = sample_numbers(stream, counted).astype(float)
     offset = (stream.stamp_ns - stream.stamp_ns[0]).astype(float)
-    middle, mean = number.mean(), offset.mean()
-    spread = ((number - middle) ** 2).sum()
-    slope = float(((number - middle) * (offset - mean)).sum() / spread) if spread else 0.0
-    start = mean - slope * middle
-    return ClockFit(start, slope, (offset - start - slope * number) * 1e-9)
+    start, slope, residual = _line(sample_numbers(stream, counted), offset)
+    return ClockFit(start, slope, residual * 1e-9)
+
+
+def _line(number: np.ndarray, offset: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Start, slope and residual of the least-squares line of offset over number."""
+    x = number - number.mean()
+    spread = float((x**2).sum())
+    slope = float((x * (offset - offset.mean())).sum()) / spread if spread else 0.0
+    start = float(offset.mean() - slope * number.mean())
+    return start, slope, offset - start - slope * number
 
 
 def stream_quality(

@@ -21,6 +21,7 @@ def inspect(
 
     Example: residuum inspect run.mcap
     """
+    from daq.errors import DataError
     from daq.log_reader import read_recording
     from daq.quality import inspect_recording
 
@@ -32,7 +33,7 @@ def inspect(
     else:
         _print(quality)
     if not quality.fit:
-        raise typer.Exit(4)
+        raise DataError(f"{log} is unfit for use: {quality.reasons[0]}")
 
 
 def _print(quality: Quality) -> None:

@@ -30,7 +30,8 @@ def recover(
     if json:
         import json as encoder
 
-        typer.echo(encoder.dumps({"schema_version": 1, "sentence": found.sentence, **asdict(found)}, indent=1))
+        plain = {"schema_version": 1, "sentence": found.sentence, **asdict(found)}
+        typer.echo(encoder.dumps(plain, indent=1))
         return
     typer.echo(found.sentence)
     for topic in found.topics:
