@@ -1,6 +1,5 @@
 """What can be wrong with a virtual robot's description."""
 
-
 from drivers.errors import ConfigError
 
 

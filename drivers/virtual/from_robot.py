@@ -14,7 +14,7 @@ from drivers.virtual.plant_file import JointPlant, NoiseSpec, PlantSpec, PlateSp
 from drivers.virtual.rigid import RigidPlant
 from drivers.virtual.urdf_tree import MOVING, read_tree
 
-# Friction where nobody knows it: shares of the effort limit as the reference robot has them (method.md: 41 of 600 N.m Coulomb, 21 N.m.s/rad x 1.6 rad/s of 600 N.m viscous).
+# Friction where nobody knows it: the reference robot's shares of its effort limit (method.md section 7).
 _COULOMB_SHARE = 0.06
 _VISCOUS_SHARE = 0.05
 _NOISE_SHARE = 0.006

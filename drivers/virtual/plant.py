@@ -9,9 +9,10 @@ import numpy as np
 from drivers.virtual.effects.effect import Effect, EffectSpec
 from drivers.virtual.effects.registry import make_effects
 from drivers.virtual.errors import PlantError
-from drivers.virtual.plant_file import GravitySpring, PlantSpec
+from drivers.virtual.plant_file import PlantSpec
 from drivers.virtual.rigid import RigidLoads, RigidPlant
 from drivers.virtual.servo import Moments, Servo
+from drivers.virtual.spring import spring_torque
 
 
 class VirtualPlant:
@@ -43,7 +44,8 @@ class VirtualPlant:
         self.rigid = RigidPlant(spec)
         rest = np.zeros(len(spec.joints)) if start_q is None else np.asarray(start_q, dtype=float)
         self._servo = Servo(self.nominal, rest, start_s, period_s, keep_s)
-        for effect in self.effects:
+        for index, effect in enumerate(self.effects):
+            effect.key = f"{index}:{effect.name}"
             effect.begin(self._servo.step_s, self._servo.history, self.rigid)
         self._tick_effects = self._using("tick")
         self._load_effects = [effect for effect in self.effects if effect.needs_loads]
@@ -155,18 +157,3 @@ class VirtualPlant:
         for effect in self._using("instants"):
             instants = effect.instants(stream, instants)
         return instants
-
-
-def spring_torque(spring: GravitySpring, angle: np.ndarray) -> np.ndarray:
-    """Torque (n,) the motor brings against a gravity spring at joint angles (n,)."""
-    turn = angle - spring.phase_rad
-    a, b = spring.radius_a_m, spring.radius_b_m
-    length = np.sqrt(a * a + b * b - 2.0 * a * b * np.cos(turn))
-    torque = np.zeros_like(angle)
-    if spring.stiffness_n_m > 0.0:
-        torque += spring.stiffness_n_m * a * b * np.sin(turn) * (1.0 - spring.rest_length_m / length)
-    for order, amplitude in enumerate(spring.cosine_nm, start=1):
-        torque += amplitude * np.cos(order * angle)
-    for order, amplitude in enumerate(spring.sine_nm, start=1):
-        torque += amplitude * np.sin(order * angle)
-    return torque

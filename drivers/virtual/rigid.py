@@ -34,6 +34,8 @@ class RigidLoads:
     """What a motion costs: joint torques (n, k), wrench of the plate on the robot (n, 6), bearing moments."""
 
     joint_nm: np.ndarray
+    link_nm: np.ndarray
+    """(n, k) the share of the links alone, without their rotors: what the gear transmits."""
     wrench: np.ndarray
     tilting_nm: np.ndarray | None = None
     """(n, k) moment across each joint's bearing, perpendicular to its axis; None when not asked for."""
@@ -94,10 +96,10 @@ class RigidPlant:
                 raw[index] -= self._generalised(force, index)
             if bearing is not None:
                 bearing[index] = self._tilting()
-        joint = raw[:, self._address]
+        link = joint = raw[:, self._address]
         if self._rotors:
-            joint = joint + raw[:, self._rotor_address] @ self.coupling[self._rotors]
-        return RigidLoads(joint, self._to_plate(raw[:, :_BASE_DOF]), bearing)
+            joint = link + raw[:, self._rotor_address] @ self.coupling[self._rotors]
+        return RigidLoads(joint, link, self._to_plate(raw[:, :_BASE_DOF]), bearing)
 
     def point(self, q: np.ndarray, link: str, point_m: np.ndarray) -> np.ndarray:
         """Position (3,) in the base frame of a link's point at joint angles (k,)."""

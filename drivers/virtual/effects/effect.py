@@ -34,19 +34,27 @@ class Range:
     low: float
     high: float
     unit: str
+    signed: bool = False
+    """Either sign is drawn."""
+    integer: bool = False
 
     @property
     def middle(self) -> float:
         """Geometric (else arithmetic) middle of the range."""
+        if self.integer:
+            return float((int(self.low) + int(self.high)) // 2)
         if self.low > 0.0:
             return float(np.sqrt(self.low * self.high))
         return 0.5 * (self.low + self.high)
 
     def draw(self, random: np.random.Generator) -> float:
         """Draw a value: log-uniform where both ends are positive, else uniform."""
+        if self.integer:
+            return float(random.integers(int(self.low), int(self.high) + 1))
+        sign = random.choice((-1.0, 1.0)) if self.signed else 1.0
         if self.low > 0.0:
-            return float(np.exp(random.uniform(np.log(self.low), np.log(self.high))))
-        return float(random.uniform(self.low, self.high))
+            return float(sign * np.exp(random.uniform(np.log(self.low), np.log(self.high))))
+        return float(sign * random.uniform(self.low, self.high))
 
 
 class Effect:
@@ -60,12 +68,14 @@ class Effect:
     where: ClassVar[str]
     place: ClassVar[str] = "joint"
     size: ClassVar[str]
+    catalogued: ClassVar[bool] = True
     needs_loads: ClassVar[bool] = False
     needs_tilting: ClassVar[bool] = False
 
     def __init__(self, spec: EffectSpec, plant: PlantSpec) -> None:
         self.spec, self.plant_spec = spec, plant
         self.width = len(plant.joints)
+        self.key = self.name
         self.j = _joint_index(spec, plant, self.place)
         self.channels = _channel_indices(spec, self.place)
         ranges = self.ranges(plant, self.j)

@@ -56,9 +56,9 @@ def default_sizes(plant: PlantSpec, name: str, joint: str | None = None) -> dict
 
 def catalogued() -> tuple[str, ...]:
     """Names of the effects that physics.md lists."""
-    return tuple(name for name, kind in effect_classes().items() if kind.where in ("I", "B", "P", "S"))
+    return tuple(name for name, kind in effect_classes().items() if kind.catalogued)
 
 
 def uncatalogued() -> tuple[str, ...]:
     """Names of the effects outside the catalogue, which a diagnosis must leave unexplained."""
-    return tuple(name for name, kind in effect_classes().items() if kind.where == "X")
+    return tuple(name for name, kind in effect_classes().items() if not kind.catalogued)
