@@ -14,6 +14,8 @@ from identify.rotations import FloatArray
 _ORDER = 4  # Butterworth, run forth and back: zero phase, twice the slope
 _GAP = 5.0  # sampling intervals: a longer hole in the stamps is a gap that no spline may bridge
 _FASTEST_HZ = 100.0  # no arm moves its links faster; quantised encoders have a floor that fools the spectrum
+# the filter halves the amplitude at its cut-off and starts to bend well below: put it above where the motion ends
+_HEADROOM = 1.45
 _SHORTEST = 60  # samples: less cannot settle the filter's ends
 
 
@@ -81,7 +83,7 @@ def choose_bandwidth(uniform: FloatArray, rate_hz: float) -> float:
     floor = np.median(power[:, top], axis=1, keepdims=True) / 0.8
     above = (power > 2.0 * floor) & (frequency < 0.8 * rate_hz / 2)
     last = [np.flatnonzero(row)[-1] if row.any() else 1 for row in _persistent(above)]
-    return float(np.clip(1.1 * frequency[max(last)], 8.0 * frequency[1], min(0.4 * rate_hz, _FASTEST_HZ)))
+    return float(np.clip(_HEADROOM * frequency[max(last)], 8.0 * frequency[1], min(0.4 * rate_hz, _FASTEST_HZ)))
 
 
 def _persistent(above: FloatArray) -> FloatArray:

@@ -46,6 +46,8 @@ def _print(quality: Quality) -> None:
     if quality.metadata:
         pairs = ", ".join(f"{key} {value}" for key, value in sorted(quality.metadata.items()))
         console.print(f"Run: {pairs}", markup=False)
+    if quality.streams:
+        console.print(f"Length: {quality.streams[0].duration_s:.3f} s", markup=False)
     console.print(_sampling(quality))
     if quality.period is not None:
         console.print(_period_line(quality), markup=False)
@@ -56,17 +58,16 @@ def _print(quality: Quality) -> None:
 
 
 def _sampling(quality: Quality):  # noqa: ANN202 - a rich table
+    from rich import box
     from rich.table import Table
 
-    table = Table()
-    for heading in ("stream", "samples", "duration s", "rate Hz", "lost", "longest gap ms", "jitter us (max)",
-                    "drift ppm", "phase ms"):
-        table.add_column(heading, justify="left" if heading == "stream" else "right")
+    table = Table(box=box.SIMPLE)
+    for heading in ("stream", "samples", "rate Hz", "lost", "gap ms", "jitter us", "drift ppm", "phase ms"):
+        table.add_column(heading, justify="left" if heading == "stream" else "right", no_wrap=True)
     for s in quality.streams:
-        gap = f"{s.gaps[0].length_s * 1e3:.2f}" if s.gaps else "-"
         table.add_row(
-            s.topic, str(s.samples), f"{s.duration_s:.3f}", f"{s.rate_hz:.4f}", str(s.lost), gap,
-            f"{s.jitter_std_s * 1e6:.1f} ({s.jitter_max_s * 1e6:.0f})",
+            s.topic, str(s.samples), f"{s.rate_hz:.3f}", str(s.lost),
+            f"{s.gaps[0].length_s * 1e3:.1f}" if s.gaps else "-", f"{s.jitter_std_s * 1e6:.1f}",
             "-" if s.drift_ppm is None else f"{s.drift_ppm:+.1f}",
             "-" if s.phase_s is None else f"{s.phase_s * 1e3:+.3f}",
         )
@@ -85,9 +86,10 @@ def _period_line(quality: Quality) -> str:
 
 
 def _repeatability(quality: Quality):  # noqa: ANN202 - a rich table
+    from rich import box
     from rich.table import Table
 
-    table = Table(title="A single period deviates by (rms)")
+    table = Table(title="A single period deviates by (rms)", box=box.SIMPLE)
     table.add_column("channel")
     table.add_column("SI units", justify="right")
     for name, value in quality.repeatability.items():
