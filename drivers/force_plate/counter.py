@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,9 @@ _LONGEST_GAP_S = 30.0
 
 _WORST_DRIFT = 300e-6
 """Rate by which two quartz clocks may part (consumer quartz: 100 ppm each, with a margin)."""
+
+_WHILE_NS = 50_000_000
+"""Longer than any converter clumps (16 ms) and than most pauses of a busy host."""
 
 _TURN_SHARE = 0.75
 """Part of a turn that must have gone by on the host before a missed turn is believed."""
@@ -29,8 +33,8 @@ class CounterUnwrapper:
 
     A wide counter tells a restart of the device by a jump backwards. A narrow one (a decimal digit, say)
     repeats so soon that whole turns may be missed: they are restored from the host's time, judged by the
-    freshest samples of two reads in a row, because the older ones of a clump, and the last before a hole,
-    are late without any loss. A restored turn thus shows one read after the hole; the total is exact.
+    freshest samples within a while, because the older ones of a clump, and the last before a hole, are late
+    without any loss. A restored turn thus shows a while after the hole; the total is exact.
     """
 
     def __init__(self, modulus: int, step: float, tick_s: float) -> None:
@@ -39,7 +43,8 @@ class CounterUnwrapper:
         self._last: int | None = None
         self._ticks = self._segment = 0
         self._read_ns = self._origin_ns = 0
-        self._floor_ticks = self._behind_ticks = 0.0
+        self._floor_ticks = 0.0
+        self._behind: deque[tuple[int, float]] = deque()  # of late reads: when, how late in ticks
 
     def advance(self, counters: Sequence[int], read_ns: int = 0) -> list[Tick]:
         """Take the counters of one read and return where their samples stand.
@@ -77,16 +82,20 @@ class CounterUnwrapper:
         if self._last is None:
             self._origin_ns = self._read_ns = read_ns
             self._floor_ticks = -float(counters[0] + self._span(counters[0], counters[1:]))
-            self._behind_ticks = self._floor_ticks
+            self._behind.append((read_ns, self._floor_ticks))
             return 0
         elapsed_ticks = (read_ns - self._origin_ns) * 1e-9 / self._tick_s
         behind = elapsed_ticks - self._ticks - self._span(self._last, counters)
         self._floor_ticks += _WORST_DRIFT * (read_ns - self._read_ns) * 1e-9 / self._tick_s
-        confirmed = min(behind, self._behind_ticks) - self._floor_ticks
-        turns = max(int(confirmed / self._modulus + 1 - _TURN_SHARE), 0)
-        self._behind_ticks = behind - turns * self._modulus
-        self._floor_ticks = min(self._floor_ticks, self._behind_ticks)
         self._read_ns = read_ns
+        self._behind.append((read_ns, behind))
+        while len(self._behind) > 1 and self._behind[1][0] <= read_ns - _WHILE_NS:
+            self._behind.popleft()
+        least = min(late for _, late in self._behind)
+        turns = max(int((least - self._floor_ticks) / self._modulus + 1 - _TURN_SHARE), 0)
+        if turns:
+            self._behind = deque((when, late - turns * self._modulus) for when, late in self._behind)
+        self._floor_ticks = min(self._floor_ticks, least - turns * self._modulus)
         return turns
 
     def _span(self, last: int, counters: Sequence[int]) -> int:
