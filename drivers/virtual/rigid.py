@@ -263,9 +263,12 @@ def _rotor_place(spec: PlantSpec, tree: Tree, index: int) -> tuple[str, np.ndarr
 def _add_rotor(
     link: mujoco.MjsBody, name: str, place: np.ndarray, axis: np.ndarray, inertia_kg_m2: float
 ) -> None:
-    body = link.add_body(name=name, pos=list(place))
-    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=list(axis))
-    tensor = _disk(inertia_kg_m2, axis) + np.eye(3) * inertia_kg_m2 * 1e-9  # clear of the triangle inequality
+    turn = np.zeros(4)
+    mujoco.mju_quatZ2Vec(turn, axis)
+    body = link.add_body(name=name, pos=list(place), quat=turn)
+    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
     body.explicitinertial = True
     body.mass = _ROTOR_MASS_KG
-    body.fullinertia = [tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+    body.ipos, body.iquat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]  # unset, MuJoCo takes the body's own pose
+    half = 0.5 * inertia_kg_m2 * (1.0 + 1e-9)  # clear of the triangle inequality
+    body.inertia = [half, half, inertia_kg_m2]

@@ -27,7 +27,7 @@ class _Pull:
 
 
 class ExternalHose(Effect):
-    """One force f = -K (p - p0) + T0 explains both models; T0 = K times the anchor's distance at zero pose."""
+    """One force f = -K (p - p0) + T0 explains both models; T0 = K times the anchor's distance."""
 
     name = "external_hose"
     where = "B"
@@ -37,10 +37,9 @@ class ExternalHose(Effect):
     @classmethod
     def ranges(cls, plant: PlantSpec, j: int) -> dict[str, Range]:
         """Parameters and their default ranges; the anchor relative to the tip at zero pose."""
+        scale_n_m = plant.noise.wrench[0] or 1.0  # a pull of the noise's size per metre
         return {
-            "stiffness_n_m": Range(
-                0.5 * plant.noise.wrench[0] + 0.5, 10.0 * plant.noise.wrench[0] + 5.0, "N/m"
-            ),
+            "stiffness_n_m": Range(0.5 * scale_n_m, 10.0 * scale_n_m, "N/m"),
             "anchor_x_m": Range(-0.5, 0.5, "m"),
             "anchor_y_m": Range(-0.5, 0.5, "m"),
             "anchor_z_m": Range(0.2, 0.8, "m"),
@@ -50,7 +49,7 @@ class ExternalHose(Effect):
         """Find where the hose hangs."""
         link, point_m = tip(self.plant_spec)
         home = rigid.point(np.zeros(self.width), link, point_m)
-        anchor = home + [self.p["anchor_x_m"], self.p["anchor_y_m"], self.p["anchor_z_m"]]
+        anchor = home + np.array([self.p[f"anchor_{axis}_m"] for axis in "xyz"])
         self._pull = _Pull(link, point_m, self.p["stiffness_n_m"], anchor)
 
     def outside(self, moments: Moments) -> Sequence[OutsideForce]:

@@ -10,7 +10,7 @@ from drivers.virtual.servo import Moments
 
 
 class TransmissionError(Effect):
-    """The link turns ahead by A sin(m th + phase), th the motor's angle: it shakes, and the plate feels it."""
+    """The link turns ahead by A sin(m th + phase), th the motor's angle; the plate feels it."""
 
     name = "transmission_error"
     where = "B"
