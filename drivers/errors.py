@@ -59,6 +59,12 @@ class LinkError(HardwareError):
 class BusOffError(LinkError):
     """The CAN controller switched itself off the bus after too many errors."""
 
+    def __init__(self, sign: str) -> None:
+        super().__init__(
+            f"The CAN controller went bus-off ({sign}); check the cable, the termination and the bit rate, "
+            "then restart the interface."
+        )
+
 
 class NodeMissingError(HardwareError):
     """Configured drives that did not report at boot; carries their node numbers."""

@@ -86,7 +86,7 @@ def _wait(traffic: Traffic, timeout_s: float, wanted: int | None) -> None:
     deadline_ns = traffic.link.now_ns() + round(timeout_s * 1e9)
 
     def absent() -> list[int]:
-        return [node for node, state in states.items() if state is None or (wanted is not None and state != wanted)]
+        return [node for node, state in states.items() if state is None or wanted not in (None, state)]
 
     while absent() and traffic.link.now_ns() < deadline_ns:
         traffic.run_until(min(deadline_ns, traffic.link.now_ns() + _LOOK_NS))

@@ -153,6 +153,7 @@ class DriveBus:
         try:
             sample = self._exchange.step(self._ledger.cycle, self._words, self._targets)
         except LinkError as error:
+            self._ledger.book_lost()
             raise self._link_failed(error) from None
         self._last = sample
         self._ledger.book(sample)
@@ -163,7 +164,7 @@ class DriveBus:
         return sample
 
     def request_stop(self, sentence: str, operator: bool = False) -> None:
-        """Ask for the stop ladder at the next cycle; may be called from any thread (plate overload, operator)."""
+        """Ask for the stop ladder at the next cycle; may be called from any thread ."""
         self._request = (CauseKind.OPERATOR if operator else CauseKind.EXTERNAL, sentence)
 
     def stop(self, reason: str | None = None) -> SessionReport:
@@ -175,7 +176,7 @@ class DriveBus:
         return self.report()
 
     def close(self) -> SessionReport:
-        """Stop what still runs, put every changed setting back, release the link; never raises for a dead bus."""
+        """Stop what still runs, put every changed setting back, release the link, even on a dead bus."""
         if self.phase is Phase.CLOSED:
             return self.report()
         try:
@@ -236,8 +237,8 @@ class DriveBus:
             if self._link.now_ns() > deadline_ns:
                 waiting = ", ".join(stage.axis for stage in self._stages if not stage.reached) or "an axis"
                 raise StateTimeoutError(
-                    f"Enabling took longer than {self.config.deadlines.enable_s:g} s: {waiting} does not follow "
-                    "its set points; read the error code of that drive."
+                    f"Enabling took longer than {self.config.deadlines.enable_s:g} s: {waiting} does not "
+                    "follow its set points; read the error code of that drive."
                 )
 
     def _enabling_step(self) -> CycleSample:
@@ -260,7 +261,9 @@ class DriveBus:
 
     def _descend(self, event: Event, last: CycleSample | None = None) -> SessionReport:
         self._exchange.demanding = False
-        self._descent = Descent(self.config.deadlines, self._traffic, self._exchange, self._stages, self.names)
+        self._descent = Descent(
+            self.config.deadlines, self._traffic, self._exchange, self._stages, self.names
+        )
         if last is not None:
             self._descent.tail.append(last)
         self._descent.run(event, self._targets, self._last)
@@ -270,6 +273,7 @@ class DriveBus:
 
     def _link_failed(self, error: LinkError) -> DriveStoppedError:
         kind = CauseKind.BUS_OFF if isinstance(error, BusOffError) else CauseKind.LINK
+        self._traffic.bus_off |= kind is CauseKind.BUS_OFF
         self._ledger.trip(kind, str(error), self._link.now_ns())
         return self._stopped(self._descend(Event.NO_LINK if self._traffic.bus_off else Event.TRIP))
 
@@ -281,6 +285,9 @@ class DriveBus:
         if not self._nodes:
             return
         failures: list[str] = []
+        if self._traffic.bus_off:
+            self._restore_failures = ("The drives' settings were not put back: the bus was off.",)
+            return
         try:
             self._traffic.command(PRE_OPERATIONAL)
             for node in self._nodes:
@@ -292,7 +299,9 @@ class DriveBus:
 
     def _expect(self, phase: Phase) -> None:
         if self.phase is not phase:
-            raise ConfigError(f"The drives are {self.phase.value}, not {phase.value}; boot, enable, cycle in order.")
+            raise ConfigError(
+                f"The drives are {self.phase.value}, not {phase.value}; boot, enable and cycle come in order."
+            )
 
     def _refuse_cycle(self) -> None:
         if self.phase is Phase.STOPPED and self._ledger.tripped:

@@ -10,7 +10,7 @@ import can
 
 from drivers.canopen.config import CanConfig
 from drivers.canopen.frame import SYNC, Frame
-from drivers.errors import BusOffError, LinkError
+from drivers.errors import LinkError
 
 #: Receive stamps further than this from their arrival are not on this machine's clock (or it was stepped).
 _FOREIGN_STAMP_NS = 500_000_000
@@ -43,7 +43,9 @@ class CanLink:
         try:
             self._opened().send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
         except can.CanError as error:
-            raise LinkError(f"Sending on {self._where} failed ({error}); check the cable and the bit rate.") from None
+            raise LinkError(
+                f"Sending on {self._where} failed ({error}); check the cable and the bit rate."
+            ) from None
         if identifier == SYNC and not self._config.own_echo:
             self._synthetic.append(Frame(self.now_ns(), SYNC, bytes(data), own=True))
 
@@ -98,8 +100,7 @@ class CanLink:
         try:
             return self._opened().recv(timeout_s)
         except can.CanError as error:
-            kind = BusOffError if getattr(error, "error_code", None) == 100 else LinkError  # ENETDOWN
-            raise kind(f"Reading from {self._where} failed ({error}); is the interface up?") from None
+            raise LinkError(f"Reading from {self._where} failed ({error}); is the interface up?") from None
 
     def _frame(self, message: Any) -> Frame | None:
         if message.is_remote_frame:

@@ -47,7 +47,7 @@ class HeartbeatWatch:
 
 
 class HeartbeatProducer:
-    """Tells when our own heartbeat is due; it beats only while the cycle runs, so a hung host falls silent."""
+    """Tells when our own heartbeat is due; only a running cycle beats, so a hung host is silent."""
 
     def __init__(self, period_ns: int) -> None:
         self._period_ns = period_ns

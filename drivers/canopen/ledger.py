@@ -59,6 +59,12 @@ class Ledger:
             self._row = [0] * len(self.names)
             self._torn_row = [0] * len(self.names)
 
+    def book_lost(self) -> None:
+        """Enter a cycle that the link's failure cut short: no axis has its values."""
+        self.cycles += 1
+        flags = Flag.MISSING_STATUS | Flag.MISSING_MOTION | Flag.NO_SYNC
+        self.missing += [MissingCycle(self.cycle, name, flags) for name in self.names]
+
     def _enter(self, sample: CycleSample, axis: int, flags: int) -> None:
         entry = MissingCycle(sample.cycle, self.names[axis], Flag(flags))
         for mask, book in ((_MISSING, self.missing), (_TORN, self.torn), (_IRREGULAR, self.irregular)):
@@ -86,7 +92,7 @@ class Ledger:
 
     def _trip_missing(self, sample: CycleSample, axis: int, flags: int) -> None:
         if flags & Flag.NO_SYNC:
-            text = f"SYNC did not appear on the bus {self._limit} times in a row; check the adapter and the cable."
+            text = f"SYNC was not on the bus {self._limit} times in a row; check the adapter and the cable."
             self.trip(CauseKind.SYNC_LOST, text, sample.sync_ns)
             return
         name = self.names[axis]

@@ -74,8 +74,8 @@ class DriveNode:
         got = self.read(entry)
         if got != value:
             raise ReadBackError(
-                f"The {self.where} was given {value} for {entry.address} ({entry.name}) but reads back {got}; "
-                "the value is outside what it takes, or another master writes too."
+                f"The {self.where} was given {value} for {entry.address} ({entry.name}) but reads back {got}"
+                "; the value is outside what it takes, or another master writes too."
             )
 
     def change(self, entry: Entry, value: int) -> None:

@@ -1,4 +1,4 @@
-"""The power stage of CiA 402 as one table: from each state, for each goal, the control word and its deadline."""
+"""The power stage of CiA 402 as one table: for each goal and state the control word and its deadline."""
 
 from __future__ import annotations
 
@@ -171,6 +171,6 @@ class PowerStage:
         elapsed_s = (now_ns - (self._since_ns or now_ns)) * 1e-9
         if elapsed_s > step.deadline_s:
             raise StateTimeoutError(
-                f"The drive of {self.axis} stayed in '{self.state.value}' for {elapsed_s:.2f} s on its way to "
-                f"'{self.goal.value}' (deadline {step.deadline_s:g} s); read its error code and its supply."
+                f"The drive of {self.axis} stayed in '{self.state.value}' for {elapsed_s:.2f} s on its way "
+                f"to '{self.goal.value}' (deadline {step.deadline_s:g} s); read its error code and supply."
             )

@@ -115,7 +115,8 @@ def load_profile(name_or_path: str | Path) -> DriveProfile:
     if not path.is_file():
         names = ", ".join(sorted(file.stem for file in _FOLDER.glob("*.toml")))
         raise ConfigError(
-            f"There is no drive profile '{name_or_path}'; name one of {names}, or give the path of a .toml file."
+            f"There is no drive profile '{name_or_path}'; name one of {names}, "
+            "or give the path of a .toml file."
         )
     try:
         return DriveProfile.model_validate(tomllib.loads(path.read_text("utf-8")))

@@ -27,7 +27,7 @@ _ALIVE = bytes([OPERATIONAL])
 
 
 class Traffic:
-    """The host's side of the bus below the cycle: one thread, no callbacks from elsewhere, nothing swallowed."""
+    """The host's side of the bus below the cycle: one thread, no foreign callbacks, nothing swallowed."""
 
     def __init__(self, link: Link, config: BusConfig, ledger: Ledger) -> None:
         nodes = [axis.node for axis in config.axes]
@@ -99,7 +99,7 @@ class Traffic:
         now_ns = self.link.now_ns()
         for node in self.heartbeats.overdue(now_ns):
             axis = self._axis_of[node]
-            text = f"The heartbeat of the drive of {axis} (node {node}) stopped; it is off, reset or unplugged."
+            text = f"The drive of {axis} (node {node}) has no heartbeat any more: off, reset or unplugged."
             self.ledger.trip(CauseKind.HEARTBEAT, text, now_ns, axis)
 
     def _sync(self, frame: Frame) -> None:
@@ -123,13 +123,14 @@ class Traffic:
         self.ledger.emergencies.append(emergency)
         if not emergency.clears and node in self._axis_of:
             axis = self._axis_of[node]
-            text = f"The drive of {axis} (node {node}) sent emergency {emergency.code:04X}h: {emergency.text}."
+            what = f"{emergency.code:04X}h, {emergency.text}"
+            text = f"The drive of {axis} (node {node}) sent emergency {what}."
             self.ledger.trip(CauseKind.EMERGENCY, text, frame.stamp_ns, axis)
 
     def _error_frame(self, frame: Frame) -> None:
         if not frame.identifier & ERROR_BUS_OFF:
             return  # the controller retries by itself; what is lost shows as missing
         self.bus_off = True
-        text = "The CAN controller went bus-off; check cable, termination and bit rate, then restart the interface."
-        self.ledger.trip(CauseKind.BUS_OFF, text, frame.stamp_ns)
-        raise BusOffError(f"{text} (Error frame: {error_text(frame.identifier)}.)")
+        error = BusOffError(f"error frame with {error_text(frame.identifier)}")
+        self.ledger.trip(CauseKind.BUS_OFF, str(error), frame.stamp_ns)
+        raise error

@@ -1,1 +1,1 @@
-"""Fake drives that behave: CiA 402 devices with dictionary, PDOs, heartbeats, faults, in virtual or real time."""
+"""Fake drives that behave: CiA 402 devices with PDOs, heartbeats and faults, in virtual or real time."""

@@ -72,7 +72,7 @@ class RealTimeFleet:
             self.fleet.tick(time.monotonic_ns())
         if self.fleet.bus_off and not self._error_sent:
             self._error_sent = True
-            self._bus.send(can.Message(arbitration_id=ERROR_BUS_OFF, is_error_frame=True, dlc=8, data=bytes(8)))
+            self._bus.send(can.Message(arbitration_id=ERROR_BUS_OFF, is_error_frame=True, data=bytes(8)))
 
     def _send_due(self) -> None:
         for ready_ns, identifier, data in self.fleet.outbox:

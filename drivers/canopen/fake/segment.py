@@ -49,7 +49,7 @@ class SimulatedSegment:
             BusOffError: after an injected bus-off.
         """
         if self._bus_off:
-            raise BusOffError("The CAN controller is off the bus; restart the interface.")
+            raise BusOffError("a frame could not be sent")
         if identifier == SYNC and self._vanishes():
             self.fleet.sync += 1
             return
