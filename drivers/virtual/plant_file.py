@@ -106,9 +106,9 @@ class ServoSpec(_Part):
     """The position loop: how the joint lags its setpoint and how a stopped joint keeps its stiction."""
 
     tick_s: Annotated[float, Field(gt=0.0, le=0.005)] = 2e-3
-    bandwidth_hz: Positive = 6.0
+    bandwidth_hz: Positive = 3.0
     acceleration_lag_s2: NonNegative = 2.5e-4
-    stiffness_nm_rad: Positive = 1e5
+    stiffness_nm_rad: Positive = 3e5
     stick_speed_rad_s: Positive = 2e-4
     hold_relaxation_s: Positive = 0.5
 
