@@ -33,6 +33,9 @@ _ORDER = 15
 _JUMP_S = 0.5
 """Device and host parting by this between two samples is a clock reset, not a delay."""
 
+_CATCH_UP_S = 8.0
+"""Time within which a host that fell behind has read its backlog."""
+
 _LOCKED_SHARE = 0.25
 """Delays that cover less than this share of the transport's period are taken as locked to it."""
 
@@ -164,22 +167,26 @@ def _segment_bounds(
 ) -> np.ndarray:
     """Return the first indices of the stretches, and n."""
     device_steps, host_steps = np.diff(ticks) * tick_s, np.diff(read_ns) * 1e-9
+    has_jumped = np.abs(host_steps - device_steps) > _JUMP_S + largest_drift * np.abs(device_steps)
+    delay_s = (read_ns - read_ns[0]) * 1e-9 - (ticks - ticks[0]) * tick_s
     is_reset = device_steps < 0
-    is_reset |= np.abs(host_steps - device_steps) > _JUMP_S + largest_drift * np.abs(device_steps)
-    # A host that slept and then reads a backlog at once falls behind and catches up: no reset.
-    is_reset &= (device_steps < 0) | _stays_apart(ticks, read_ns, tick_s)
+    for index in np.flatnonzero(has_jumped & ~is_reset):
+        is_reset[index] = _stays_apart(delay_s, read_ns, int(index))
     if segment is not None:
         is_reset |= np.diff(segment) != 0
     return np.concatenate(([0], np.flatnonzero(is_reset) + 1, [len(ticks)]))
 
 
-def _stays_apart(ticks: np.ndarray, read_ns: np.ndarray, tick_s: float, reach: int = 64) -> np.ndarray:
-    """Whether the least delay of the samples after each step differs by a jump from the least before."""
-    delay = (read_ns - read_ns[0]) * 1e-9 - (ticks - ticks[0]) * tick_s
-    padded = np.concatenate((np.full(reach - 1, np.inf), delay, np.full(reach - 1, np.inf)))
-    least = np.lib.stride_tricks.sliding_window_view(padded, reach).min(axis=1)
-    before, after = least[: len(delay) - 1], least[reach : reach + len(delay) - 1]
-    return np.abs(after - before) > _JUMP_S / 2
+def _stays_apart(delay_s: np.ndarray, read_ns: np.ndarray, index: int) -> bool:
+    """Whether the least delays before and after a step differ for good.
+
+    A host that slept and then reads a backlog at once falls behind and catches up: no reset.
+    """
+    reach_ns = round(_CATCH_UP_S * 1e9)
+    low = int(np.searchsorted(read_ns, read_ns[index] - reach_ns))
+    high = int(np.searchsorted(read_ns, read_ns[index + 1] + reach_ns))
+    before, after = delay_s[low : index + 1].min(), delay_s[index + 1 : high + 1].min()
+    return bool(abs(after - before) > _JUMP_S / 2)
 
 
 def _map_segment(
