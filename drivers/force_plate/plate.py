@@ -31,6 +31,9 @@ from drivers.force_plate.tare import Tare, tare_of
 _READ_TIMEOUT_S = 0.05
 """Longest time that the reader thread sleeps in a read, and thus that stopping takes."""
 
+_RESEND_NS = 500_000_000
+"""A device that is still starting up misses its first command."""
+
 _STALL_PERIODS = 20
 _LEAST_STALL_S = 0.25
 """Default deadline: twenty samples, and never less than what a busy host may take to look."""
@@ -117,11 +120,16 @@ class ForcePlate:
             PlateRefusedError: a command was not acknowledged.
             PlateUnpluggedError: the port vanished.
         """
+        self._parser = PlateParser(self.protocol)
+        self._samples.clear()
+        self._total = self._overloaded = self._invalid = 0
+        rest = b""
         with self._translated():
             self._port().reset_input_buffer()
             for exchange in self.protocol.startup:
-                self._exchange(exchange)
+                rest = self._exchange(exchange)
         self._is_stopping, self._failure, self._last_ns = False, None, self._now_ns()
+        self._take(self._parser.feed(rest, self._last_ns))
         self._thread = threading.Thread(target=self._read_loop, name="force-plate", daemon=True)
         self._thread.start()
 
@@ -227,18 +235,23 @@ class ForcePlate:
             self._failure = failure
             self._arrived.notify_all()
 
-    def _exchange(self, exchange: Exchange) -> None:
-        """Send a command and wait for its acknowledgement among whatever else arrives."""
+    def _exchange(self, exchange: Exchange) -> bytes:
+        """Send a command, again every half second, until it is acknowledged; return what came after."""
         port = self._port()
         port.write(exchange.send)
         if not exchange.expect:
-            return
+            return b""
         answer = bytearray()
-        deadline_ns = self._now_ns() + round(exchange.timeout_s * 1e9)
+        begun_ns = sent_ns = self._now_ns()
         while exchange.expect not in answer:
-            if self._now_ns() > deadline_ns:
+            now_ns = self._now_ns()
+            if now_ns > begun_ns + round(exchange.timeout_s * 1e9):
                 raise PlateRefusedError(self.port, exchange.send, exchange.expect, bytes(answer))
+            if now_ns > sent_ns + _RESEND_NS:
+                port.write(exchange.send)
+                sent_ns = now_ns
             answer += port.read(max(port.in_waiting, 1))
+        return bytes(answer[answer.index(exchange.expect) + len(exchange.expect) :])
 
     def _port(self) -> serial.Serial:
         if self._serial is None:

@@ -28,6 +28,9 @@ STATUS_TOO_LATE = 0x1
 STATUS_OVERRANGE = 0x2
 STATUS_INVALID = 0x4
 STATUS_UNCALIBRATED = 0x8
+_BOOT_S = 3.0
+"""Longest time that the sensor takes from power-on to its first answer."""
+
 _BAUD_CODES = {9600: 0, 57600: 1, 115200: 2, 230400: 3, 460800: 4}
 
 
@@ -69,7 +72,7 @@ class Bota:
     def startup(self) -> tuple[Exchange, ...]:
         """Configuration mode, calibrated binary output, filter, then run mode."""
         return (
-            Exchange(b"C", b"r,0,C,0"),
+            Exchange(b"C", b"r,0,C,0", timeout_s=_BOOT_S),
             Exchange(b"c,0,1,0,%d" % _BAUD_CODES[self.baud], b"r,0,c,0"),
             Exchange(b"f,%d,0,0,1" % self.sinc_length, b"r,0,f,0"),
             Exchange(b"R", b"r,0,R,0"),
