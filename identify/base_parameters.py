@@ -14,6 +14,9 @@ from identify.rotations import FloatArray
 # a unit-norm column counts as independent when this much of it is new; sampled double-precision regressors
 # leave 1e-13 where it is not, genuine columns leave more than 1e-4
 _INDEPENDENT = 1e-7
+# columns less new than this are taken only when nothing better is left: a representative that is nearly dependent
+# on the others makes definitions of huge coefficients that cancel
+_CLEARLY_INDEPENDENT = 1e-2
 _COEFFICIENT_ZERO = 1e-9
 
 
@@ -31,12 +34,15 @@ class Reduction:
     definitions: FloatArray
 
 
-def independent_columns(matrix: FloatArray, order: FloatArray) -> list[int]:
+def independent_columns(
+    matrix: FloatArray, order: FloatArray, passes: tuple[float, ...] = (_INDEPENDENT,)
+) -> list[int]:
     """Pick a maximal independent set of columns, greedily in the order given.
 
     Args:
         matrix: sampled regressor, shape (rows, P).
         order: indices into the columns, first choice first.
+        passes: how much of a unit-norm column must be new, pass by pass over what is left.
 
     Returns:
         Indices of the columns picked, in the order picked.
@@ -45,16 +51,18 @@ def independent_columns(matrix: FloatArray, order: FloatArray) -> list[int]:
     scale = norms.max(initial=0.0)
     basis = np.empty((matrix.shape[0], 0))
     picked: list[int] = []
-    for index in order:
-        if norms[index] <= _INDEPENDENT * scale:
-            continue  # numerically zero: rounding noise must not count as rank
-        column = matrix[:, index] / norms[index]
-        for _ in range(2):  # twice is enough (Kahan)
-            column = column - basis @ (basis.T @ column)
-        rest = np.linalg.norm(column)
-        if rest > _INDEPENDENT:
-            basis = np.column_stack([basis, column / rest])
-            picked.append(int(index))
+    # numerically zero columns are left out: rounding noise must not count as rank
+    left = [int(index) for index in order if norms[index] > _INDEPENDENT * scale]
+    for threshold in passes:
+        for index in left:
+            column = matrix[:, index] / norms[index]
+            for _ in range(2):  # twice is enough (Kahan)
+                column = column - basis @ (basis.T @ column)
+            rest = np.linalg.norm(column)
+            if rest > threshold:
+                basis = np.column_stack([basis, column / rest])
+                picked.append(index)
+        left = [index for index in left if index not in picked]
     return picked
 
 
@@ -71,7 +79,7 @@ def reduce_columns(matrix: FloatArray, order: FloatArray) -> Reduction:
     Source:
         Gautier, Numerical calculation of the base inertial parameters of robots, J. Robotic Systems 8(4) 1991.
     """
-    picked = independent_columns(matrix, order)
+    picked = independent_columns(matrix, order, (_CLEARLY_INDEPENDENT, _INDEPENDENT))
     kept = matrix[:, picked]
     scale = np.linalg.norm(kept, axis=0)
     coefficients = np.linalg.lstsq(kept / scale, matrix, rcond=None)[0] / scale[:, None]

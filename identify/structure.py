@@ -14,7 +14,6 @@ from identify.base_parameters import Reduction, prefer, reduce_columns
 from identify.friction import internal_columns
 from identify.inertia import PARAMETERS
 from identify.parameters import (
-    Parameter,
     internal_parameters,
     plate_parameters,
     raw_rigid_parameters,
@@ -110,7 +109,7 @@ def to_drives(robot: Robot, rows: FloatArray) -> FloatArray:
 
 def _flat(rows: FloatArray) -> FloatArray:
     """Stack rows (c, P, N) to a matrix (c N, P)."""
-    return rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])
+    return rows.transpose(0, 2, 1).reshape(rows.shape[0] * rows.shape[2], rows.shape[1])  # P may be 0
 
 
 def _gravity_replacements(robot: Robot, names: list[str]) -> tuple[GravityReplacement, ...]:

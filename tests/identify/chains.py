@@ -40,10 +40,19 @@ def random_description(seed, moving, prismatic_share=0.3, fixed=1):
 
 def _body(rng, kind):
     axis = rng.normal(size=3)
-    a, b, c = rng.uniform(0.05, 0.4, 3)  # a body made of masses along three axes satisfies the triangle inequality
-    return Body(kind, rng.normal(size=3) * 0.4, rng.uniform(-1.5, 1.5, 3), axis / np.linalg.norm(axis),
-                float(rng.uniform(0.5, 8.0)), rng.normal(size=3) * 0.2, rng.uniform(-1.5, 1.5, 3),
-                np.array([b + c, a + c, a + b]))
+    a, b, c = rng.uniform(
+        0.05, 0.4, 3
+    )  # a body made of masses along three axes satisfies the triangle inequality
+    return Body(
+        kind,
+        rng.normal(size=3) * 0.4,
+        rng.uniform(-1.5, 1.5, 3),
+        axis / np.linalg.norm(axis),
+        float(rng.uniform(0.5, 8.0)),
+        rng.normal(size=3) * 0.2,
+        rng.uniform(-1.5, 1.5, 3),
+        np.array([b + c, a + c, a + b]),
+    )
 
 
 def _text(vector):
@@ -59,7 +68,8 @@ def urdf_text(description):
             f'<link name="l{k}"><inertial><origin xyz="{_text(b.com)}" rpy="{_text(b.com_rpy)}"/><mass value="{b.mass:.17g}"/>'
             f'<inertia ixx="{i[0]:.17g}" ixy="0" ixz="0" iyy="{i[1]:.17g}" iyz="0" izz="{i[2]:.17g}"/></inertial></link>'
             f'<joint name="j{k}" type="{b.kind}"><parent link="{parent}"/><child link="l{k}"/>'
-            f'<origin xyz="{_text(b.xyz)}" rpy="{_text(b.rpy)}"/><axis xyz="{_text(b.axis)}"/></joint>')
+            f'<origin xyz="{_text(b.xyz)}" rpy="{_text(b.rpy)}"/><axis xyz="{_text(b.axis)}"/></joint>'
+        )
     return "".join(parts) + "</robot>"
 
 
@@ -76,12 +86,16 @@ def mjcf_text(description):
         head.append(
             f'<body name="l{k}" pos="{_text(b.xyz)}" quat="{_quat(b.rpy)}">'
             + (f'<joint name="j{k}" type="{joint}" axis="{_text(b.axis)}"/>' if joint else "")
-            + f'<inertial pos="{_text(b.com)}" quat="{_quat(b.com_rpy)}" mass="{b.mass:.17g}" diaginertia="{_text(b.principal)}"/>')
+            + f'<inertial pos="{_text(b.com)}" quat="{_quat(b.com_rpy)}" mass="{b.mass:.17g}" diaginertia="{_text(b.principal)}"/>'
+        )
         tail.append("</body>")
     return (
         f'<mujoco><compiler angle="radian"/><option gravity="{_text(description.gravity)}"><flag contact="disable"/></option>'
         '<worldbody><body name="base"><freejoint/><inertial pos="0 0 0" mass="1e-12" diaginertia="1e-12 1e-12 1e-12"/>'
-        + "".join(head) + "".join(tail) + "</body></worldbody></mujoco>")
+        + "".join(head)
+        + "".join(tail)
+        + "</body></worldbody></mujoco>"
+    )
 
 
 def oracle_loads(description, q, qd, qdd):
@@ -101,7 +115,9 @@ def robot_of(description, plate=None, drives=None):
     """The chain as identification sees it, with its true link parameters as the reference."""
     chain = read_urdf(urdf_text(description))
     plain = Drive(friction=(), offset=False)
-    joints = tuple(replace(joint, drive=drives[k] if drives else plain) for k, joint in enumerate(chain.joints))
+    joints = tuple(
+        replace(joint, drive=drives[k] if drives else plain) for k, joint in enumerate(chain.joints)
+    )
     return Robot("chain", joints, description.gravity, plate, None, chain.parameters)
 
 
@@ -112,7 +128,11 @@ def random_plate(seed, tared=False):
 
 def random_states(seed, n, count=30):
     rng = np.random.default_rng(seed)
-    return rng.uniform(-1.5, 1.5, (n, count)), rng.normal(size=(n, count)) * 1.5, rng.normal(size=(n, count)) * 4.0
+    return (
+        rng.uniform(-1.5, 1.5, (n, count)),
+        rng.normal(size=(n, count)) * 1.5,
+        rng.normal(size=(n, count)) * 4.0,
+    )
 
 
 def smooth_motion(seed, n):

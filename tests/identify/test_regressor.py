@@ -4,7 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from identify.inertia import body_from_parameters, inertia_matrix, parameters_from_body, pseudo_inertia, transform_parameters
+from identify.inertia import (
+    body_from_parameters,
+    inertia_matrix,
+    parameters_from_body,
+    pseudo_inertia,
+    transform_parameters,
+)
 from identify.regressor import rigid_columns
 from identify.rotations import rotation_from_rpy, rpy_from_rotation
 from tests.identify import chains
@@ -46,7 +52,10 @@ def test_power_is_the_rate_of_energy(seed, moving):
     description = chains.random_description(seed, moving)
     robot, motion = chains.robot_of(description), chains.smooth_motion(seed, moving)
     model = mujoco.MjModel.from_xml_string(
-        chains.mjcf_text(description).replace("<option ", '<option integrator="Euler" ').replace("<flag ", '<flag energy="enable" '))
+        chains.mjcf_text(description)
+        .replace("<option ", '<option integrator="Euler" ')
+        .replace("<flag ", '<flag energy="enable" ')
+    )
     data = mujoco.MjData(model)
 
     def energy(t):
@@ -59,7 +68,9 @@ def test_power_is_the_rate_of_energy(seed, moving):
     for t in np.linspace(0.0, 4.0, 9):
         tau, _ = loads(robot, *motion(np.array([t])))
         step = 1e-4
-        rate = (8 * (energy(t + step) - energy(t - step)) - (energy(t + 2 * step) - energy(t - 2 * step))) / (12 * step)
+        rate = (8 * (energy(t + step) - energy(t - step)) - (energy(t + 2 * step) - energy(t - 2 * step))) / (
+            12 * step
+        )
         assert tau[:, 0] @ motion(np.array([t]))[1][:, 0] == pytest.approx(rate, rel=1e-6, abs=1e-6)
 
 
@@ -84,8 +95,14 @@ def test_base_wrench_is_the_rate_of_momentum(seed, moving):
     for t in np.linspace(0.0, 4.0, 7):
         _, wrench = loads(robot, *motion(np.array([t])))
         step, (_, _, mass, com) = 1e-4, momentum(t)
-        rate = [(8 * (momentum(t + step)[k] - momentum(t - step)[k]) - (momentum(t + 2 * step)[k] - momentum(t - 2 * step)[k]))
-                / (12 * step) for k in (0, 1)]
+        rate = [
+            (
+                8 * (momentum(t + step)[k] - momentum(t - step)[k])
+                - (momentum(t + 2 * step)[k] - momentum(t - 2 * step)[k])
+            )
+            / (12 * step)
+            for k in (0, 1)
+        ]
         weight = mass * description.gravity
         np.testing.assert_allclose(wrench[:3, 0], rate[0] - weight, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(wrench[3:, 0], rate[1] - np.cross(com, weight), rtol=1e-6, atol=1e-6)
@@ -110,7 +127,9 @@ def test_standing_still_the_plate_carries_the_weight():
     q = chains.random_states(0, 3)[0]
     _, wrench = loads(robot, q, np.zeros_like(q), np.zeros_like(q))
     weight = 9.81 * sum(body.mass for body in description.bodies)
-    np.testing.assert_allclose(wrench[:3], np.array([0, 0, weight])[:, None] * np.ones(q.shape[1]), atol=1e-9 * weight)
+    np.testing.assert_allclose(
+        wrench[:3], np.array([0, 0, weight])[:, None] * np.ones(q.shape[1]), atol=1e-9 * weight
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))
