@@ -67,6 +67,7 @@ class Exchange:
         assert self._schedule is not None, "start() comes before step()"
         sync, sync_ns, seen, late = self.sync, self._sync_ns, self._sync_seen, self._late
         self._send(words, targets)
+        self._schedule.hold_until(self._traffic.link.now_ns() + self._period_ns // 2)
         self._next_sync(self._schedule)
         harvest = self._traffic.assembler.close()
         sample = self._sample(harvest, cycle, sync, sync_ns, late, tuple(targets), seen)
@@ -82,19 +83,29 @@ class Exchange:
     def _next_sync(self, schedule: SyncSchedule) -> None:
         traffic = self._traffic
         if self._by_itself:
-            traffic.echo_ns = None
-            echo_ns = traffic.wait_echo(max(self._sync_ns, traffic.link.now_ns()) + 3 * self._period_ns // 2)
-            traffic.beat()
-            sent_ns = echo_ns if echo_ns is not None else traffic.link.now_ns()
-        else:
-            traffic.run_until(schedule.due_ns)
-            traffic.echo_ns = None
-            sent_ns = traffic.link.now_ns()
-            traffic.link.send(SYNC, b"")
-            echo_ns = traffic.wait_echo(sent_ns + self._period_ns // 2)
-        self._late = schedule.sent(sent_ns)
+            self._await_sync()
+            return
+        traffic.run_until(schedule.due_ns)
+        traffic.echo_ns = None
+        sent_ns = traffic.link.now_ns()
+        traffic.link.send(SYNC, b"")
+        echo_ns = traffic.wait_echo(sent_ns + self._period_ns // 2)
+        self._note_sync(echo_ns, sent_ns, schedule.sent(sent_ns))
+
+    def _await_sync(self) -> None:
+        """The link produces SYNC: wait for the next one, and judge it by its distance to the last."""
+        traffic, before_ns = self._traffic, self._sync_ns
+        traffic.echo_ns = None
+        traffic.beat()
+        echo_ns = traffic.wait_echo(traffic.link.now_ns() + 3 * self._period_ns // 2)
+        now_ns = traffic.link.now_ns()
+        late = self.sync >= 0 and (echo_ns or now_ns) - before_ns > 6 * self._period_ns // 5
+        self._note_sync(echo_ns, now_ns, late)
+
+    def _note_sync(self, echo_ns: int | None, otherwise_ns: int, late: bool) -> None:
         self._sync_seen = echo_ns is not None
-        self._sync_ns = echo_ns if echo_ns is not None else sent_ns
+        self._sync_ns = echo_ns if echo_ns is not None else otherwise_ns
+        self._late = late
         self.sync += 1
 
     def _sample(

@@ -168,7 +168,7 @@ class PowerStage:
         return step.control_word
 
     def _check_deadline(self, step: Step, now_ns: int) -> None:
-        elapsed_s = (now_ns - (self._since_ns or now_ns)) * 1e-9
+        elapsed_s = 0.0 if self._since_ns is None else (now_ns - self._since_ns) * 1e-9
         if elapsed_s > step.deadline_s:
             raise StateTimeoutError(
                 f"The drive of {self.axis} stayed in '{self.state.value}' for {elapsed_s:.2f} s on its way "

@@ -28,6 +28,10 @@ class SyncSchedule:
         """When the next SYNC is to leave [ns]."""
         return self._due_ns
 
+    def hold_until(self, time_ns: int) -> None:
+        """Put the next SYNC off until `time_ns` [ns] or later: set points that left late arrive first."""
+        self._due_ns = max(self._due_ns, time_ns)
+
     def sent(self, at_ns: int) -> bool:
         """Note that the SYNC left at `at_ns` and plan the next.
 

@@ -15,7 +15,7 @@ from drivers.canopen.can_link import CanLink
 from drivers.canopen.config import AxisConfig, BusConfig, CanConfig, Deadlines
 from drivers.canopen.fake.axis import InertiaAxis, InertiaPlant
 from drivers.canopen.fake.contents import DriveData
-from drivers.canopen.fake.faults import Fault, FaultKind, FaultPlan
+from drivers.canopen.fake.faults import Fault, FaultPlan
 from drivers.canopen.fake.fleet import Fleet
 from drivers.canopen.fake.realtime import RealTimeFleet
 from drivers.canopen.fake.segment import SimulatedSegment
@@ -53,6 +53,12 @@ class Bench:
         rate_hz, axes = self.config.rate_hz, len(self.config.axes)
         return [self.bus.cycle(sway(k, rate_hz, axes)) for k in range(cycles)]
 
+    def run_on(self, cycles: int) -> list:
+        """Some more cycles at rest where the last ones ended."""
+        last = self.bus._last.target
+        targets = [axis.units.position_rad(t) for axis, t in zip(self.bus._axes, last, strict=True)]
+        return [self.bus.cycle(targets) for _ in range(cycles)]
+
     def pass_time(self, duration_s: float) -> None:
         """Let the drives go on without a host."""
         if self.segment is not None:
@@ -62,7 +68,7 @@ class Bench:
 
 
 @contextmanager
-def virtual_bench(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
+def open_virtual(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
     config = bus_config(axes, **changes)
     fleet = make_fleet(axes, plan=FaultPlan(faults))
     segment = SimulatedSegment(fleet)
@@ -71,7 +77,7 @@ def virtual_bench(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
 
 
 @contextmanager
-def real_bench(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
+def open_real(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
     channel = f"bench-{next(_channels)}"
     deadlines = Deadlines(boot_s=2.0, quick_stop_s=0.6, nmt_stop_s=0.4)
     # Half a second of patience: the machine that tests may be busy with something else.
@@ -83,10 +89,19 @@ def real_bench(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
         yield Bench("real time", config, fleet, bus)
 
 
-@pytest.fixture(params=[virtual_bench, real_bench], ids=["virtual-time", "real-time"])
+@pytest.fixture(params=[open_virtual, open_real], ids=["virtual-time", "real-time"])
 def bench(request):
     """Opens a bench on either clock; takes faults."""
     return request.param
 
 
-__all__ = ["Bench", "Fault", "FaultKind", "bus_config", "make_fleet", "real_bench", "sway", "virtual_bench"]
+@pytest.fixture
+def virtual_bench():
+    """Opens a bench in virtual time."""
+    return open_virtual
+
+
+@pytest.fixture
+def real_bench():
+    """Opens a bench in real time."""
+    return open_real
