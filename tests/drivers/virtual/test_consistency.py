@@ -30,11 +30,15 @@ def run(arm, motion):
 
 def rotors(arm, q, qd, qdd):
     """Rotor torques and momentum rate of the parallel-axis arm, by hand."""
-    (n1, n2, n3), (i1, i2, i3) = zip(*((j.gear_ratio, j.rotor_inertia_kg_m2) for j in arm.joints), strict=True)
+    (n1, n2, n3), (i1, i2, i3) = zip(
+        *((j.gear_ratio, j.rotor_inertia_kg_m2) for j in arm.joints), strict=True
+    )
     a1, a2, a3 = qdd.T
     v1, v2, v3 = qd.T
     spin, pull = n2 * v2 * i2 + n3 * v3 * i3, n2 * a2 * i2 + n3 * a3 * i3
-    joint = np.stack([n1**2 * i1 * a1, n2**2 * i2 * a2 + n3 * i3 * a3, n3 * i3 * a2 + n3**2 * i3 * a3], axis=1)
+    joint = np.stack(
+        [n1**2 * i1 * a1, n2**2 * i2 * a2 + n3 * i3 * a3, n3 * i3 * a2 + n3**2 * i3 * a3], axis=1
+    )
     sine, cosine = np.sin(q[:, 0]), np.cos(q[:, 0])
     moment = np.stack(
         [-sine * pull - cosine * v1 * spin, cosine * pull - sine * v1 * spin, n1 * a1 * i1], axis=1
@@ -48,7 +52,12 @@ def test_currents_and_wrench_follow_from_the_true_motion(arm, run):
     joint, base = oracle.pinocchio_loads(arm, m.q, m.qd, m.qdd)
     spin, moment = rotors(arm, m.q, m.qd, m.qdd)
     for k, part in enumerate(arm.joints):
-        tau = joint[:, k] + spin[:, k] + part.coulomb_nm * np.sign(m.qd[:, k]) + part.viscous_nm_s * m.qd[:, k]
+        tau = (
+            joint[:, k]
+            + spin[:, k]
+            + part.coulomb_nm * np.sign(m.qd[:, k])
+            + part.viscous_nm_s * m.qd[:, k]
+        )
         tau += part.offset_nm + spring(part, m.q[:, k])
         seen = run.currents(t_s)[:, k] * part.gear_ratio * part.torque_constant_nm_a
         assert np.abs(seen - tau).max() < 1e-3 * arm.noise.joint_torque_nm[k]

@@ -79,7 +79,9 @@ def test_rotors_load_the_joints_as_the_published_equations_say(arm, states):
 
 def rotor_momentum(arm, q, qd):
     """Spin momentum of the IR 361's rotors about the base's axes (equations 11 to 13)."""
-    (n1, n2, n3), (i1, i2, i3) = zip(*((j.gear_ratio, j.rotor_inertia_kg_m2) for j in arm.joints), strict=True)
+    (n1, n2, n3), (i1, i2, i3) = zip(
+        *((j.gear_ratio, j.rotor_inertia_kg_m2) for j in arm.joints), strict=True
+    )
     y_axis = np.stack([-np.sin(q[:, 0]), np.cos(q[:, 0]), np.zeros(len(q))], axis=1)
     z_axis = np.tile([0.0, 0.0, 1.0], (len(q), 1))
     along_y = n2 * qd[:, 1] * i2 + n3 * qd[:, 2] * i3
