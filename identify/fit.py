@@ -11,7 +11,7 @@ from identify.blocks import Block, PeriodicRows, noise_of, periodic_rows, residu
 from identify.dataset import Dataset
 from identify.errors import ModelError, NotPeriodicError
 from identify.fourier import FourierTrajectory, fit_trajectory, unfiltered
-from identify.free_motion import FreeOptions, free_rows
+from identify.free_motion import FreeOptions, Thinning, free_rows
 from identify.maximum_likelihood import maximise_likelihood
 from identify.model import Model, build_model
 from identify.noise import NoiseModel, noise_from_scatter
@@ -82,6 +82,8 @@ class Fit:
         lack_of_fit: omnibus test.
         intervals_valid: whether the plain intervals hold.
         warnings: what the reader must know.
+        thinning: how a non-periodic run became rows, None for a periodic run.
+        tables: scatter between the periods of every block, as (table (c, M, B), degrees of freedom).
     """
 
     model: Model
@@ -97,6 +99,8 @@ class Fit:
     lack_of_fit: LackOfFit
     intervals_valid: bool
     warnings: tuple[str, ...] = field(default=())
+    thinning: Thinning | None = None
+    tables: tuple[tuple[FloatArray, float], ...] = ()
 
     @property
     def theta(self) -> FloatArray:
@@ -219,7 +223,8 @@ def _fit_periodic(
     warnings += drift_warnings(tables, rows.blocks, noises)
     warnings += motion_warnings(model.robot, *trajectory.evaluate(window.start_s + np.linspace(0, window.period_s, 400)))
     result = Fit(
-        model, data, window, trajectory, None, rows, noises, solution, np.empty(0), (), lack_of_fit(solution, noises), True
+        model, data, window, trajectory, None, rows, noises, solution, np.empty(0), (),
+        lack_of_fit(solution, noises), True, tables=tuple(tables),
     )
     return _conclude(result, warnings)
 
@@ -246,7 +251,8 @@ def _fit_free(model: Model, data: Dataset, options: FitOptions, warnings: list[s
     )
     warnings += motion_warnings(model.robot, motion.q[:, motion.valid], motion.qd[:, motion.valid], motion.qdd[:, motion.valid])
     rows = PeriodicRows(blocks, ())
-    result = Fit(model, data, None, None, motion, rows, noises, solution, np.empty(0), (), lack_of_fit(solution, noises), False)
+    result = Fit(model, data, None, None, motion, rows, noises, solution, np.empty(0), (), lack_of_fit(solution, noises), False,
+                 thinning=formed.thinning)
     return _conclude(result, warnings)
 
 

@@ -36,12 +36,28 @@ class FreeOptions:
 
 
 @dataclass(frozen=True)
+class Thinning:
+    """How series on the motion's grid become rows: ends dropped, low-passed, every so many kept."""
+
+    trim: int
+    factor: int
+
+    def apply(self, series: FloatArray) -> FloatArray:
+        """Thin series, shape (..., N)."""
+        return _decimate(series[..., self.trim : series.shape[-1] - self.trim], self.factor)
+
+    def pick(self, series: FloatArray) -> FloatArray:
+        """Take the same instants without filtering."""
+        return series[..., self.trim : series.shape[-1] - self.trim][..., :: self.factor]
+
+
+@dataclass(frozen=True)
 class FreeRows:
     """One block of a non-periodic run, and the motion it rests on."""
 
     block: Block
     motion: SmoothMotion
-    decimate: int
+    thinning: Thinning
 
 
 def _on_grid(source: Signal, grid: FloatArray) -> FloatArray:
@@ -101,24 +117,22 @@ def free_rows(model: Model, data: Dataset, options: FreeOptions = FreeOptions())
     motion = smooth(position, options.bandwidth_hz)
     factor = options.decimate or max(1, int(0.8 * motion.rate_hz / (2.5 * motion.bandwidth_hz)))
     channels, joint, rows, target, usable = _stacked(model, data, motion)
-    trim = slice(options.trim, len(motion.t_s) - options.trim)
-    thinned = slice(None, None, factor)
-    kept = usable[:, trim][:, thinned]
+    thinning = Thinning(options.trim, factor)
     block = Block(
         channels,
         joint,
-        _decimate(rows.columns[:, :, trim], factor),
-        _decimate(rows.known[:, trim], factor),
-        _decimate(target[:, trim], factor),
-        kept,
+        thinning.apply(rows.columns),
+        thinning.apply(rows.known),
+        thinning.apply(target),
+        thinning.pick(usable),
         1,
-        motion.t_s[trim][thinned],
+        thinning.pick(motion.t_s),
     )
     if block.rows < 2 * len(model.parameters):
         raise UnusableDataError(
             f"{data.source} leaves {block.rows} usable rows for {len(model.parameters)} parameters after filtering; record longer."
         )
-    return FreeRows(block, motion, factor)
+    return FreeRows(block, motion, thinning)
 
 
 def _stacked(

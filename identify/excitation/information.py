@@ -1,0 +1,263 @@
+"""What a motion tells: the information matrix of parameters, torque constants and effects, and its derivative."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identify.base_parameters import independent_columns
+from identify.excitation.errors import DesignError
+from identify.excitation.limits import MotionLimits
+from identify.excitation.reference import ReferenceModel
+from identify.friction import drive_velocity
+from identify.model import Model
+from identify.rotations import FloatArray
+
+# Verdonck, Swevers, Samin 2001: std per sample of the base wrench; the joints' are taken relative to the effort
+WRENCH_NOISE = {
+    "force.x": 10.54, "force.y": 10.88, "force.z": 4.81, "torque.x": 11.61, "torque.y": 11.33, "torque.z": 3.15,
+}  # fmt: skip
+_JOINT_NOISE_SHARE = 0.005  # of the effort limit: 3.55 of 600, 4.03 of 900, 1.26 of 300 N.m on the published arm
+_STEP = 1e-6  # of the forward differences: rounding and curvature both cost about 1e-8 of a column
+_RICH, _SEED = 200, 7
+# speed below which the search smooths Coulomb's sign, as a share of a typical speed
+_SMOOTH_SHARE = 0.03
+
+EffectColumns = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """Physics a design shall reveal.
+
+    Attributes:
+        name: as in the catalogue, with its place, such as ``stribeck_friction:joint_2``.
+        columns: (q, qd, qdd), each (n, N), to its columns (channels, k, N) in the channels' units.
+    """
+
+    name: str
+    columns: EffectColumns
+
+
+@dataclass(frozen=True)
+class NoiseLevels:
+    """Std per sample of every channel.
+
+    Attributes:
+        std: shape (channels,).
+        sentence: where they come from.
+    """
+
+    std: FloatArray
+    sentence: str
+
+
+def noise_levels(model: Model, given: Mapping[str, float], where: str = "the robot file") -> NoiseLevels:
+    """Collect noise levels; those not given are published ones (plate) or a share of the effort limit (joints).
+
+    Args:
+        model: the model, for its channels.
+        given: std by channel name [N.m or N].
+        where: the source of ``given``, for the statement.
+
+    Returns:
+        The levels.
+
+    Raises:
+        DesignError: a level is not positive.
+    """
+    guessed = {}
+    for joint in model.robot.joints:
+        effort = joint.limits.effort
+        guessed[joint.name] = _JOINT_NOISE_SHARE * effort if np.isfinite(effort) and effort > 0 else 1.0
+    std = np.array([given.get(channel, (guessed | WRENCH_NOISE).get(channel, 1.0)) for channel in model.channels])
+    for channel, level in zip(model.channels, std, strict=True):
+        if not (np.isfinite(level) and level > 0.0):
+            raise DesignError(f"The noise of channel '{channel}' in {where} is {level:g}; give a positive std per sample.")
+    count = sum(channel in given for channel in model.channels)
+    if count == len(std):
+        return NoiseLevels(std, f"All {count} levels from {where}.")
+    rest = f"{len(std) - count} of {len(std)} levels assumed: {_JOINT_NOISE_SHARE:.1%} of the effort limits, published plate noise"
+    return NoiseLevels(std, f"{rest}; the others from {where}." if count else f"{rest}.")
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Whitened columns of a motion and the reference torques.
+
+    Attributes:
+        columns: shape (channels, columns, N).
+        torque: drive torques of the reference model, shape (n, N).
+    """
+
+    columns: FloatArray
+    torque: FloatArray
+
+    def information(self, samples: float) -> FloatArray:
+        """Information matrix of ``samples`` samples spread like the grid's."""
+        flat = self.columns.transpose(1, 0, 2).reshape(self.columns.shape[1], -1)
+        return flat @ flat.T * (samples / self.columns.shape[2])
+
+
+@dataclass(frozen=True)
+class InformationModel:
+    """Columns of parameters, torque constants and effects, under the noise.
+
+    Attributes:
+        model: combined or internal.
+        noise: std per channel.
+        reference: values to expect.
+        free_scales: joints whose torque constant is an unknown, shape (k,).
+        kept: columns that any motion could tell apart, shape (m,); of parameters, then constants, then effects.
+        smooth_speed: speed at which the search smooths Coulomb's sign, shape (n,).
+        effects: physics a discriminating design shall reveal.
+        effect_columns: for every effect, its positions among the kept columns.
+    """
+
+    model: Model
+    noise: NoiseLevels
+    reference: ReferenceModel
+    free_scales: FloatArray
+    kept: FloatArray
+    smooth_speed: FloatArray
+    effects: tuple[NamedEffect, ...] = ()
+    effect_columns: tuple[FloatArray, ...] = field(default=())
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the kept columns that are parameters or torque constants."""
+        names = self.all_names
+        return [names[k] for k in self.kept if k < len(names)]
+
+    @property
+    def all_names(self) -> list[str]:
+        """Names of the parameters, then of the unknown torque constants."""
+        joints = self.model.robot.joint_names
+        return [p.name for p in self.model.parameters] + [f"{joints[k]}.torque_constant" for k in self.free_scales]
+
+    @property
+    def baseline(self) -> int:
+        """Number of kept columns that belong to parameters and torque constants."""
+        return len(self.names)
+
+    def sample(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, smooth: bool = False) -> Sampled:
+        """Evaluate whitened columns and torques.
+
+        Args:
+            q: positions, shape (n, N).
+            qd: velocities, shape (n, N).
+            qdd: accelerations, shape (n, N).
+            smooth: take tanh for Coulomb's sign, as the search does.
+
+        Returns:
+            The kept columns and the torques.
+        """
+        columns, torque = self._all_columns(q, qd, qdd, smooth)
+        return Sampled(columns[:, self.kept], torque)
+
+    def _all_columns(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray, smooth: bool
+    ) -> tuple[FloatArray, FloatArray]:
+        model, theta = self.model, self.reference.theta
+        sign = np.tanh(drive_velocity(model.robot, qd) / self.smooth_speed[:, None]) if smooth else None
+        drives = model.drive_rows(q, qd, qdd, sign)
+        torque = np.tensordot(theta, drives.columns, axes=([0], [1])) + drives.known
+        parts = [drives.columns]
+        if model.kind == "combined":
+            parts.append(model.wrench_rows(q, qd, qdd).columns)
+        columns = np.concatenate(parts)
+        scales = np.zeros((len(columns), len(self.free_scales), q.shape[1]))
+        scales[self.free_scales, np.arange(len(self.free_scales))] = torque[self.free_scales]
+        extra = [effect.columns(q, qd, qdd) for effect in self.effects]
+        return np.concatenate([columns, scales, *extra], axis=1) / self.noise.std[:, None, None], torque
+
+    def differentiate(
+        self, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    ) -> tuple[Sampled, Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]]:
+        """Evaluate smooth columns and the way back from their derivatives to the motion's.
+
+        Args:
+            q: positions, shape (n, N).
+            qd: velocities, shape (n, N).
+            qdd: accelerations, shape (n, N).
+
+        Returns:
+            The sample, and a function of (derivative by columns, derivative by torque) that gives the
+            derivatives by q, qd and qdd, each (n, N). A column at one instant depends on the motion at
+            that instant only, so 3 n forward differences serve any number of coefficients.
+        """
+        n, count = q.shape
+        state = np.concatenate([q, qd, qdd])
+        moved = np.repeat(state[:, None], 3 * n + 1, axis=1)
+        moved[np.arange(3 * n), np.arange(1, 3 * n + 1)] += _STEP
+        flat = moved.reshape(3 * n, -1)
+        every = self.sample(flat[:n], flat[n : 2 * n], flat[2 * n :], smooth=True)
+        columns = every.columns.reshape(*every.columns.shape[:2], 3 * n + 1, count)
+        torque = every.torque.reshape(n, 3 * n + 1, count)
+        here = Sampled(np.ascontiguousarray(columns[:, :, 0]), torque[:, 0])
+
+        def pull_back(columns_bar: FloatArray, torque_bar: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            with_columns = np.einsum("cpn,cpkn->kn", columns_bar, columns)
+            with_torque = np.einsum("jn,jkn->kn", torque_bar, torque)
+            both = with_columns + with_torque
+            slope = (both[1:] - both[0]) / _STEP
+            return slope[:n], slope[n : 2 * n], slope[2 * n :]
+
+        return here, pull_back
+
+
+def information_model(
+    model: Model,
+    noise: NoiseLevels,
+    reference: ReferenceModel,
+    limits: MotionLimits,
+    effects: tuple[NamedEffect, ...] = (),
+) -> InformationModel:
+    """Find which columns motions inside the limits can tell apart, and keep those.
+
+    Args:
+        model: combined or internal; without a plate torque constants are not unknowns.
+        noise: levels per channel.
+        reference: values to expect.
+        limits: what motions keep.
+        effects: physics a discriminating design shall reveal.
+
+    Returns:
+        The information model.
+
+    Raises:
+        DesignError: an effect's columns are swallowed by the baseline whatever the motion.
+    """
+    speed = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0)
+    has_constant = [k for k, joint in enumerate(model.robot.joints) if joint.drive.torque_constant is not None]
+    free = np.array(has_constant if model.kind == "combined" else [], dtype=int)
+    count = len(model.parameters) + len(free)
+    everything = InformationModel(model, noise, reference, free, np.arange(0), _SMOOTH_SHARE * speed, effects)
+    rng = np.random.default_rng(_SEED)
+    q = rng.uniform(limits.lower[:, None], limits.upper[:, None], (model.robot.n, _RICH))
+    hard = np.where(np.isfinite(limits.acceleration), limits.acceleration, 5.0 * speed)
+    qd, qdd = (rng.uniform(-1.0, 1.0, q.shape) * size[:, None] for size in (speed, hard))
+    columns, _ = everything._all_columns(q, qd, qdd, False)
+    flat = columns.transpose(0, 2, 1).reshape(-1, columns.shape[1])
+    kept = np.sort(independent_columns(flat, np.arange(columns.shape[1])))
+    places = _effect_places(everything, q, qd, qdd, kept, count)
+    return InformationModel(model, noise, reference, free, kept, everything.smooth_speed, effects, places)
+
+
+def _effect_places(
+    model: InformationModel, q: FloatArray, qd: FloatArray, qdd: FloatArray, kept: FloatArray, first: int
+) -> tuple[FloatArray, ...]:
+    places = []
+    for effect in model.effects:
+        width = effect.columns(q[:, :2], qd[:, :2], qdd[:, :2]).shape[1]
+        own = np.flatnonzero((kept >= first) & (kept < first + width))
+        if len(own) < width:
+            raise DesignError(
+                f"Effect '{effect.name}' keeps {len(own)} of its {width} columns beside the model and the effects before "
+                "it, whatever the motion: no excitation can reveal it; leave it out, or measure another channel."
+            )
+        places.append(own)
+        first += width
+    return tuple(places)
