@@ -11,6 +11,7 @@ from daq.checks import interval_ns, unwrapped
 from daq.recording import Stream
 
 _REGULAR = 0.2  # of an interval: stamps that scatter less are on a clock
+OUTAGE_S = 1.0
 STUCK_S = 0.5  # a measured channel that does not change by one bit for so long is not measuring
 _STUCK_SAMPLES = 25
 _DRIFT_LIMIT_PPM = 5000.0  # beyond, two rates are different rates and not drifting clocks
@@ -37,6 +38,7 @@ class StreamQuality:
         rate_hz: by its own clock fit.
         lost: samples that the log lacks, by the device's count and by the stamps.
         holes: those of them that the device's own count proves.
+        in_outages: those of them lost in gaps longer than a second.
         gaps: the longest stretches without samples, longest first, at most five.
         gap_count: how many there are.
         jitter_std_s: scatter of the stamps about a uniform clock.
@@ -55,6 +57,7 @@ class StreamQuality:
     rate_hz: float
     lost: int
     holes: int
+    in_outages: int
     gaps: tuple[Gap, ...]
     gap_count: int
     jitter_std_s: float
@@ -68,8 +71,9 @@ class StreamQuality:
 
     @property
     def loss_share(self) -> float:
-        """Lost samples over all that should be there."""
-        return self.lost / max(1, self.samples + self.lost)
+        """Samples lost here and there over all that should be there; whole outages are another matter."""
+        scattered = self.lost - self.in_outages
+        return scattered / max(1, self.samples + scattered)
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,7 @@ def stream_quality(
         rate_hz=1e9 / clock.interval_ns if clock.interval_ns else 0.0,
         lost=sum(gap.missing for gap in gaps),
         holes=sum(max(0, int(step) - 1) for step in np.diff(unwrapped(stream.sequence))) if counted else 0,
+        in_outages=sum(gap.missing for gap in gaps if gap.length_s > OUTAGE_S),
         gaps=tuple(gaps[:5]),
         gap_count=len(gaps),
         jitter_std_s=float(clock.residual_s.std()),

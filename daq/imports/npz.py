@@ -21,7 +21,7 @@ def read_npz(path: Path, plan: ImportMap) -> Table:
     wanted = {plan.time_column, *(c for m in plan.channels.values() for c in (*m.columns, m.time))} - {None}
     columns: dict[str, np.ndarray] = {}
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             names = list(archive.files)
             for name in names:
                 if name in wanted:

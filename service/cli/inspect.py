@@ -40,21 +40,21 @@ def _print(quality: Quality) -> None:
     from rich.console import Console
 
     console = Console(highlight=False)
-    console.print(f"{quality.source}: {quality.verdict}", style="bold", markup=False)
+    console.print(f"{quality.source}: {quality.verdict}", style="bold", markup=False, soft_wrap=True)
     for reason in quality.reasons:
-        console.print(f"  {reason}", markup=False)
+        console.print(f"  {reason}", markup=False, soft_wrap=True)
     if quality.metadata:
         pairs = ", ".join(f"{key} {value}" for key, value in sorted(quality.metadata.items()))
-        console.print(f"Run: {pairs}", markup=False)
+        console.print(f"Run: {pairs}", markup=False, soft_wrap=True)
     if quality.streams:
-        console.print(f"Length: {quality.streams[0].duration_s:.3f} s", markup=False)
+        console.print(f"Length: {quality.streams[0].duration_s:.3f} s", markup=False, soft_wrap=True)
     console.print(_sampling(quality))
     if quality.period is not None:
-        console.print(_period_line(quality), markup=False)
+        console.print(_period_line(quality), markup=False, soft_wrap=True)
     if quality.repeatability:
         console.print(_repeatability(quality))
     for note in quality.notes:
-        console.print(f"note: {note}", markup=False)
+        console.print(f"note: {note}", markup=False, soft_wrap=True)
 
 
 def _sampling(quality: Quality):  # noqa: ANN202 - a rich table

@@ -28,8 +28,10 @@ def test_live_and_bulk_writing_agree(tmp_path):
     joints, currents, wrench = recording.joint_states, recording.motor_currents, recording.wrench
     with LogWriter(tmp_path / "live.mcap", recording.metadata) as log:
         for i in range(40):
-            when = [(int(s.stamp_ns[i]), int(s.log_time_ns[i]), int(s.sequence[i]))
-                    for s in (joints, currents, wrench)]
+            when = [
+                (int(s.stamp_ns[i]), int(s.log_time_ns[i]), int(s.sequence[i]))
+                for s in (joints, currents, wrench)
+            ]
             log.write_joint_states(*when[0], joints.names, joints.data["position"][i])
             log.write_motor_currents(*when[1], joints.names, list(currents.data["current"][i]))
             log.write_wrench(*when[2], wrench.data["force"][i], wrench.data["torque"][i])
@@ -49,16 +51,19 @@ def test_mcap_ros2_support_reads_the_same(tmp_path):
     joints = seen["/joint_states"]
     assert [m.sequence for m in joints] == list(range(50))
     np.testing.assert_array_equal(
-        [m.ros_msg.position for m in joints], recording.joint_states.data["position"])
+        [m.ros_msg.position for m in joints], recording.joint_states.data["position"]
+    )
     stamps = [m.ros_msg.header.stamp.sec * 10**9 + m.ros_msg.header.stamp.nanosec for m in joints]
     np.testing.assert_array_equal(stamps, recording.joint_states.stamp_ns)
     assert list(joints[0].ros_msg.name) == list(logs.NAMES)
     assert not len(joints[0].ros_msg.effort)
     np.testing.assert_array_equal(
-        [m.ros_msg.current for m in seen["/motor_currents"]], recording.motor_currents.data["current"])
+        [m.ros_msg.current for m in seen["/motor_currents"]], recording.motor_currents.data["current"]
+    )
     np.testing.assert_array_equal(
         [m.ros_msg.wrench.torque.z for m in seen["/force_plate/wrench"]],
-        recording.wrench.data["torque"][:, 2])
+        recording.wrench.data["torque"][:, 2],
+    )
 
 
 def test_rosbags_reads_the_same(tmp_path):
@@ -72,11 +77,14 @@ def test_rosbags_reads_the_same(tmp_path):
         for connection, _, data in reader.messages():
             seen.setdefault(connection.topic, []).append(reader.deserialize(data, connection.msgtype))
     np.testing.assert_array_equal(
-        [m.position for m in seen["/joint_states"]], recording.joint_states.data["position"])
+        [m.position for m in seen["/joint_states"]], recording.joint_states.data["position"]
+    )
     np.testing.assert_array_equal(
-        [m.current for m in seen["/motor_currents"]], recording.motor_currents.data["current"])
+        [m.current for m in seen["/motor_currents"]], recording.motor_currents.data["current"]
+    )
     np.testing.assert_array_equal(
-        [m.wrench.force.y for m in seen["/force_plate/wrench"]], recording.wrench.data["force"][:, 1])
+        [m.wrench.force.y for m in seen["/force_plate/wrench"]], recording.wrench.data["force"][:, 1]
+    )
 
 
 def test_the_reference_checker_finds_every_checksum_right(tmp_path):
@@ -100,14 +108,44 @@ def test_raw_topics_keep_counts_and_words(tmp_path):
     with LogWriter(tmp_path / "raw.mcap") as log:
         for i in range(5):
             log.write_joint_states(logs.START_NS + i, logs.START_NS + i, i, names, [0.0, i])
-            log.write_raw("/drive/raw", logs.START_NS + i, logs.START_NS + i, i, name=names, device_stamp=2**63 + i,
-                          host_receive_ns=-i, cycle=i, position=[-(2**31), i], velocity=[1, 2], current=[3, 4],
-                          status_word=[0x1637, 2**32 - 1])
-            log.write_raw("/clock_sync", logs.START_NS + i, logs.START_NS + i, i, device="plate", device_stamp=i,
-                          host_receive_ns=i, mapped_ns=i, uncertainty_s=1e-6)
-            log.write_raw("/force_plate/raw", logs.START_NS + i, logs.START_NS + i, i, device_stamp=i,
-                          host_receive_ns=i, counter=i, status_word=0, counts=range(i), values=[0.5] * 6,
-                          temperature=21.5)
+            log.write_raw(
+                "/drive/raw",
+                logs.START_NS + i,
+                logs.START_NS + i,
+                i,
+                name=names,
+                device_stamp=2**63 + i,
+                host_receive_ns=-i,
+                cycle=i,
+                position=[-(2**31), i],
+                velocity=[1, 2],
+                current=[3, 4],
+                status_word=[0x1637, 2**32 - 1],
+            )
+            log.write_raw(
+                "/clock_sync",
+                logs.START_NS + i,
+                logs.START_NS + i,
+                i,
+                device="plate",
+                device_stamp=i,
+                host_receive_ns=i,
+                mapped_ns=i,
+                uncertainty_s=1e-6,
+            )
+            log.write_raw(
+                "/force_plate/raw",
+                logs.START_NS + i,
+                logs.START_NS + i,
+                i,
+                device_stamp=i,
+                host_receive_ns=i,
+                counter=i,
+                status_word=0,
+                counts=range(i),
+                values=[0.5] * 6,
+                temperature=21.5,
+            )
         log.write_event(logs.START_NS, logs.START_NS, 0, "fault", "error", 7, "the drive of a stopped")
         log.write_event(logs.START_NS, logs.START_NS, 1, "end", "info", 9, "done")
     drive = read_raw(tmp_path / "raw.mcap", "/drive/raw")
@@ -133,8 +171,12 @@ def test_later_metadata_wins(tmp_path):
 
 
 _TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=("Cs",)), max_size=9)
-_WORDS = {"int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1), "int64": (-(2**63), 2**63 - 1),
-          "uint64": (0, 2**64 - 1)}
+_WORDS = {
+    "int32": (-(2**31), 2**31 - 1),
+    "uint32": (0, 2**32 - 1),
+    "int64": (-(2**63), 2**63 - 1),
+    "uint64": (0, 2**64 - 1),
+}
 
 
 @settings(max_examples=60, deadline=None)
@@ -157,9 +199,18 @@ def test_any_message_comes_back_from_its_bytes(schema, data):
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.lists(st.tuples(st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9), st.integers(0, 2**64 - 1),
-                          st.integers(0, 2**32 - 1),
-                          st.lists(st.floats(width=64), min_size=2, max_size=2)), min_size=1, max_size=20))
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9),
+            st.integers(0, 2**64 - 1),
+            st.integers(0, 2**32 - 1),
+            st.lists(st.floats(width=64), min_size=2, max_size=2),
+        ),
+        min_size=1,
+        max_size=20,
+    )
+)
 def test_any_numbers_survive(tmp_path_factory, samples):
     path = tmp_path_factory.mktemp("p") / "any.mcap"
     with LogWriter(path) as log:
@@ -179,11 +230,14 @@ def test_the_sample_logs_agree_with_the_reference_reader():
     theirs = {}
     for message in logs.decoded(path):
         theirs.setdefault(message.topic, []).append(message.ros_msg)
-    np.testing.assert_array_equal([m.position for m in theirs["/joint_states"]],
-                                  mine.joint_states.data["position"])
-    np.testing.assert_array_equal([m.current for m in theirs["/motor_currents"]],
-                                  mine.motor_currents.data["current"])
+    np.testing.assert_array_equal(
+        [m.position for m in theirs["/joint_states"]], mine.joint_states.data["position"]
+    )
+    np.testing.assert_array_equal(
+        [m.current for m in theirs["/motor_currents"]], mine.motor_currents.data["current"]
+    )
     np.testing.assert_array_equal(
         [(m.wrench.force.x, m.wrench.force.y, m.wrench.force.z) for m in theirs["/force_plate/wrench"]],
-        mine.wrench.data["force"])
+        mine.wrench.data["force"],
+    )
     assert mine.metadata["kind"] == "validation"
