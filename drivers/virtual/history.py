@@ -57,24 +57,24 @@ class History:
                 f"The virtual robot knows {self._first_s:.3f} to {self._first_s + last * self.step_s:.3f} s, "
                 f"asked for {np.min(t_s):.3f} s to {np.max(t_s):.3f} s: advance it first."
             )
-        tick = np.clip(place.astype(np.int64), 0, max(last - 1, 0))
+        tick = np.minimum(np.maximum(place.astype(np.int64), 0), max(last - 1, 0))
         return tick, place - tick
 
     def smooth(
         self, name: str, tick: np.ndarray, fraction: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Value, slope and bend of the quintic through series `name`, `name_d`, `name_dd`."""
+        """Value, slope and bend (n, k) of the quintic through series `name`, `name_d`, `name_dd`."""
         h = self.step_s
         y, v, a = (self.series(name + suffix) for suffix in ("", "_d", "_dd"))
-        after = np.minimum(tick + 1, len(y) - 1)
-        y0, v0, a0 = y[tick], v[tick] * h, a[tick] * h * h / 2.0
+        after, half = np.minimum(tick + 1, len(y) - 1), h * h / 2.0
+        y0, v0, a0 = y[tick], v[tick] * h, a[tick] * half
         gap_y = y[after] - (y0 + v0 + a0)
         gap_v = v[after] * h - (v0 + 2.0 * a0)
-        gap_a = a[after] * h * h / 2.0 - a0
+        gap_a = a[after] * half - a0
         c3 = 10.0 * gap_y - 4.0 * gap_v + gap_a
         c4 = -15.0 * gap_y + 7.0 * gap_v - 2.0 * gap_a
         c5 = 6.0 * gap_y - 3.0 * gap_v + gap_a
-        u = fraction.reshape(-1, *([1] * (y.ndim - 1)))
+        u = fraction[:, None]
         value = y0 + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5))))
         slope = (v0 + u * (2.0 * a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * 5.0 * c5)))) / h
         bend = (2.0 * a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * 20.0 * c5))) / (h * h)

@@ -19,9 +19,13 @@ class PoleFilter:
 
     def __init__(self, poles: np.ndarray, step_s: float, width: int) -> None:
         pole = np.asarray(poles, dtype=complex)
+        if len(pole) < 2:
+            raise ValueError("a pole filter needs two poles, or its output has no second derivative")
         apart = pole[:, None] - pole[None, :] + np.eye(len(pole))
         self._pole = pole
-        self._residue = np.prod(-pole) / np.prod(apart, axis=1)
+        residue = np.prod(-pole) / np.prod(apart, axis=1)
+        self._outputs = np.array([residue, residue * pole, residue * pole**2])
+        self._through = float((residue * pole).sum().real)  # of the input to the second derivative
         decay = np.exp(pole * step_s)
         ramp = (decay - 1.0 - pole * step_s) / (pole**2 * step_s)
         self._decay, self._new, self._old = decay, ramp, (decay - 1.0) / pole - ramp
@@ -37,12 +41,8 @@ class PoleFilter:
         """Take the next inputs (n, k); return output and its two derivatives (n, k) at the same ticks."""
         modes = self._long(level) if len(level) >= _LONG else self._short(level)
         self._mode, self._input = modes[:, -1].copy(), np.array(level[-1], dtype=float)
-        gain = self._residue
-        value = np.tensordot(gain, modes, axes=(0, 0)).real
-        slope = np.tensordot(gain * self._pole, modes, axes=(0, 0)).real + gain.sum().real * level
-        through = (gain * self._pole).sum().real
-        bend = np.tensordot(gain * self._pole**2, modes, axes=(0, 0)).real + through * level
-        return value, slope, bend
+        flat = (self._outputs @ modes.reshape(len(modes), -1)).real.reshape(3, *level.shape)
+        return flat[0], flat[1], flat[2] + self._through * level
 
     def _long(self, level: np.ndarray) -> np.ndarray:
         modes = np.empty((len(self._pole), *level.shape), dtype=complex)
@@ -54,11 +54,13 @@ class PoleFilter:
 
     def _short(self, level: np.ndarray) -> np.ndarray:
         modes = np.empty((len(self._pole), *level.shape), dtype=complex)
-        mode, before = self._mode, self._input
-        decay, old, new = self._decay[:, None], self._old[:, None], self._new[:, None]
-        for index, now in enumerate(level):
-            mode = decay * mode + old * before + new * now
-            modes[:, index], before = mode, now
+        mode = self._mode
+        decay = self._decay[:, None]
+        inputs = np.concatenate([self._input[None], level])
+        push = self._old[:, None, None] * inputs[:-1] + self._new[:, None, None] * inputs[1:]
+        for index in range(len(level)):
+            mode = decay * mode + push[:, index]
+            modes[:, index] = mode
         return modes
 
 

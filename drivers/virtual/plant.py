@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from drivers.virtual.effects.effect import Effect, EffectSpec
+from drivers.virtual.effects.effect import HOOKS, Effect, EffectSpec
 from drivers.virtual.effects.registry import make_effects
 from drivers.virtual.errors import PlantError
 from drivers.virtual.plant_file import PlantSpec
@@ -47,6 +47,9 @@ class VirtualPlant:
         for index, effect in enumerate(self.effects):
             effect.key = f"{index}:{effect.name}"
             effect.begin(self._servo.step_s, self._servo.history, self.rigid)
+        self._last: Moments | None = None
+        self._last_loads: RigidLoads | None = None
+        self._hooks = {hook: [e for e in self.effects if e.has(hook)] for hook in HOOKS}
         self._tick_effects = self._using("tick")
         self._load_effects = [effect for effect in self.effects if effect.needs_loads]
         self._tick(self._servo.at(np.array([start_s])))
@@ -54,7 +57,7 @@ class VirtualPlant:
         self._to_motor = np.linalg.inv(self.rigid.coupling)  # (k, k): motor torque = joint torque @ this
 
     def _using(self, hook: str) -> list[Effect]:
-        return [effect for effect in self.effects if effect.has(hook)]
+        return self._hooks[hook]
 
     @property
     def time_s(self) -> float:
@@ -78,6 +81,7 @@ class VirtualPlant:
                 f"Setpoints of {self.spec.name} must be finite and {len(self.spec.joints)} wide, "
                 f"got {points.shape}."
             )
+        self._last = None  # the history's ticks may move
         self._tick(self._servo.follow(points))
         self._servo.history.forget()
 
@@ -89,8 +93,11 @@ class VirtualPlant:
             effect.tick(moments, loads)
 
     def moments(self, t_s: np.ndarray) -> Moments:
-        """Return the motors' motion at any known instants (n,)."""
-        return self._servo.at(np.asarray(t_s, dtype=float))
+        """Return the motors' motion at any known instants (n,); the last answer is kept."""
+        instants = np.asarray(t_s, dtype=float)
+        if self._last is None or not np.array_equal(self._last.t_s, instants):
+            self._last, self._last_loads = self._servo.at(instants), None
+        return self._last
 
     def link_motion(self, moments: Moments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Angles, speeds and accelerations (n, k) of the links, which follow the motors through the gears."""
@@ -102,6 +109,14 @@ class VirtualPlant:
 
     def loads(self, moments: Moments) -> RigidLoads:
         """Joint torques and plate wrench of the rigid bodies, rotors and outside forces."""
+        if moments is self._last and self._last_loads is not None:
+            return self._last_loads
+        loads = self._loads(moments)
+        if moments is self._last:
+            self._last_loads = loads
+        return loads
+
+    def _loads(self, moments: Moments) -> RigidLoads:
         outside = [force for effect in self._using("outside") for force in effect.outside(moments)]
         tilting = any(effect.needs_tilting for effect in self.effects)
         q, qd, qdd = self.link_motion(moments)

@@ -61,7 +61,11 @@ class RigidPlant:
         self._address = [int(self.model.joint(joint.name).dofadr[0]) for joint in spec.joints]
         self._rotor_address = [int(self.model.joint(_rotor_name(spec, i)).dofadr[0]) for i in self._rotors]
         self._plate_axes = np.eye(3) if spec.plate is None else rotation_from_rpy(spec.plate.rpy_rad)
-        self._plate_origin = np.zeros(3) if spec.plate is None else np.array(spec.plate.xyz_m)
+        x, y, z = (0.0, 0.0, 0.0) if spec.plate is None else spec.plate.xyz_m
+        self._lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # r x F of the plate's origin
+        shift = self.model.nq - self.model.nv  # the free joint's quaternion has one number more
+        self._angles = np.add(self._address, shift)
+        self._gears = self.coupling[self._rotors]
 
     def _refuse_extra_joints(self) -> None:
         known = set(self.spec.joint_names)
@@ -98,7 +102,7 @@ class RigidPlant:
                 bearing[index] = self._tilting()
         link = joint = raw[:, self._address]
         if self._rotors:
-            joint = link + raw[:, self._rotor_address] @ self.coupling[self._rotors]
+            joint = link + raw[:, self._rotor_address] @ self._gears
         return RigidLoads(joint, link, self._to_plate(raw[:, :_BASE_DOF]), bearing)
 
     def point(self, q: np.ndarray, link: str, point_m: np.ndarray) -> np.ndarray:
@@ -112,14 +116,13 @@ class RigidPlant:
         self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, speed: np.ndarray, pull: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         count = len(q)
-        qpos = np.tile(self.model.qpos0, (count, 1))
-        qvel, qacc = np.zeros((count, self.model.nv)), np.zeros((count, self.model.nv))
-        shift = self.model.nq - self.model.nv  # the free joint's quaternion has one number more
-        qpos[:, np.add(self._address, shift)] = q
+        qpos = np.repeat(self.model.qpos0[None], count, axis=0)
+        qvel, qacc = np.zeros((2, count, self.model.nv))
+        qpos[:, self._angles] = q
         qvel[:, self._address], qacc[:, self._address] = qd, qdd
         if self._rotors:  # a rotor's angle does not matter: it is a body of revolution
-            qvel[:, self._rotor_address] = speed @ self.coupling[self._rotors].T
-            qacc[:, self._rotor_address] = pull @ self.coupling[self._rotors].T
+            qvel[:, self._rotor_address] = speed @ self._gears.T
+            qacc[:, self._rotor_address] = pull @ self._gears.T
         return qpos, qvel, qacc
 
     def _generalised(self, force: OutsideForce, index: int) -> np.ndarray:
@@ -145,7 +148,7 @@ class RigidPlant:
 
     def _to_plate(self, reaction: np.ndarray) -> np.ndarray:
         force, moment = reaction[:, :3], reaction[:, 3:]
-        moment = moment - np.cross(self._plate_origin, force)
+        moment = moment - force @ self._lever.T
         return np.hstack([force @ self._plate_axes, moment @ self._plate_axes])
 
 

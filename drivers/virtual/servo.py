@@ -49,6 +49,7 @@ class Servo:
         self._coulomb = np.array([joint.coulomb_nm for joint in spec.joints])
         self._viscous = np.array([joint.viscous_nm_s for joint in spec.joints])
         self._error = PoleFilter(smooth_poles(self._loop.bandwidth_hz), self.step_s, len(spec.joints))
+        self._weights = _spline_weights(self.ticks_per_period, period_s)
         self._pull = np.zeros(len(spec.joints))
         self._run = np.zeros((2, len(spec.joints)))  # sign of the last motion, time since it ended
         self.end_s = start_s
@@ -58,19 +59,14 @@ class Servo:
         """Take the next setpoints (m, k), one a period, and move; return the new ticks."""
         knots = np.vstack([self._knots, setpoints])
         self._knots = knots[-3:]
-        place = np.arange(1, self.ticks_per_period + 1) / self.ticks_per_period
-        period_s = self.step_s * self.ticks_per_period
-        powers = np.vander(place, 4, increasing=True)
-        slopes = np.array([np.zeros_like(place), place**0, 2 * place, 3 * place**2]).T / period_s
-        bends = np.array([place * 0, place * 0, 2 * place**0, 6 * place]).T / period_s**2
         origin = knots[:-3]
         windows = np.stack([knots[i : len(knots) - 3 + i] - origin for i in range(4)], axis=1)
-        shape = (-1, knots.shape[1])
-        q, qd, qdd = (
-            np.einsum("uw,mwk->muk", weight @ _SPLINE, windows) for weight in (powers, slopes, bends)
+        parts = self._weights @ windows  # (m, 3 * ticks, k)
+        ticks, shape = self.ticks_per_period, (-1, knots.shape[1])
+        q = (parts[:, :ticks] + origin[:, None]).reshape(shape)
+        return self._store(
+            q, parts[:, ticks : 2 * ticks].reshape(shape), parts[:, 2 * ticks :].reshape(shape)
         )
-        q = q + origin[:, None]
-        return self._store(q.reshape(shape), qd.reshape(shape), qdd.reshape(shape))
 
     def at(self, t_s: np.ndarray) -> Moments:
         """Return the motion at any instants so far."""
@@ -98,9 +94,8 @@ class Servo:
     def _disturbance(self, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
         """Error (n, k) the loop would settle at: acceleration lag, friction over stiffness."""
         change = np.abs(qdd) * self.step_s / 2.0 + 1e-300
-        side = np.where(
-            np.abs(qd) < _STILL_RAD_S, np.nan, np.clip(qd / change, -1.0, 1.0)
-        )  # mean sign over a tick
+        mean_sign = np.minimum(np.maximum(qd / change, -1.0), 1.0)  # over a tick
+        side = np.where(np.abs(qd) < _STILL_RAD_S, np.nan, mean_sign)
         side = _carry_forward(side, self._pull)
         self._pull = side[-1].copy()
         friction = self._coulomb * side + self._viscous * qd
@@ -109,6 +104,9 @@ class Servo:
     def _stiction(self, qd: np.ndarray, commanded_still: np.ndarray) -> np.ndarray:
         """Share (n, k) of the break-away friction that holds a stopped joint; NaN where the joint moves."""
         still = commanded_still & (np.abs(qd) < self._loop.stick_speed_rad_s)
+        if not still.any():
+            self._run = np.array([np.sign(qd[-1]), np.zeros(qd.shape[1])])
+            return np.full(qd.shape, np.nan)
         side = _carry_forward(np.where(still, np.nan, np.sign(qd)), self._run[0])
         tick = np.arange(1.0, len(qd) + 1.0)[:, None]
         moved = _carry_forward(np.where(still, np.nan, tick), -self._run[1] / self.step_s)
@@ -117,8 +115,20 @@ class Servo:
         return np.where(still, side * np.exp(-rest_s / self._loop.hold_relaxation_s), np.nan)
 
 
+def _spline_weights(ticks: int, period_s: float) -> np.ndarray:
+    """Weights (3 ticks, 4) of four setpoints: values, slopes and bends of the B-spline at the ticks."""
+    u = np.arange(1, ticks + 1) / ticks
+    none, one = np.zeros(ticks), np.ones(ticks)
+    value = np.array([one, u, u**2, u**3]).T
+    slope = np.array([none, one, 2.0 * u, 3.0 * u**2]).T / period_s
+    bend = np.array([none, none, 2.0 * one, 6.0 * u]).T / period_s**2
+    return np.asarray(np.vstack([value, slope, bend]) @ _SPLINE)
+
+
 def _carry_forward(values: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Replace every NaN (n, k) by the last number above it, `before` (k,) at the top."""
+    if not np.isnan(values).any():
+        return values
     stacked = np.vstack([np.broadcast_to(before, (1, values.shape[1])), values])
     row = np.where(np.isnan(stacked), 0, np.arange(len(stacked))[:, None])
     row = np.maximum.accumulate(row, axis=0)

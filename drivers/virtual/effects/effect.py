@@ -14,6 +14,7 @@ from drivers.virtual.plant_file import PlantSpec
 from drivers.virtual.rigid import OutsideForce, RigidLoads, RigidPlant
 from drivers.virtual.servo import Moments
 
+HOOKS = ("tick", "deviation", "outside", "torque", "current", "plate", "encoder", "instants")
 CHANNELS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
