@@ -17,6 +17,7 @@ from daq.timebase import map_to_host
 WIRE_S = 10 * FRAME_BYTES / BAUD
 SETTLED = 3000  # samples (20 s) after which the causal clock is judged
 TARGET_MS = {"USB-CDC": 0.1, "FTDI 1 ms": 0.1, "FTDI 16 ms": 0.5}
+FIRST_SEED = 1000  # none of these was looked at while the bounds were chosen
 NO_TARGET_MS = float("inf")  # beating clocks: the error may be large, but must be stated
 
 
@@ -37,7 +38,7 @@ def measure(name: str, seeds: int) -> dict[str, float]:
     link = LINKS[name]
     errors: dict[str, list] = {"arrival": [], "least_squares": [], "hull": [], "causal": []}
     covered, causal_covered, stated = [], [], []
-    for seed in range(seeds):
+    for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         run = simulate(link, seed)
         base = map_to_host(run.ticks, run.read_ns, tick_s=TICK_S, wire_s=WIRE_S, transport=link.known)
         shift_ns = round((WIRE_S + link.known.floor_s) * 1e9)

@@ -89,7 +89,7 @@ class CausalClock:
         last = self._x[-1] if self._x else float(self._blocks[-1][0][-1])
         assert self._line is not None
         y = (read_ns - self._read0_ns) * 1e-9 - x
-        return x < last - self._tick_s or y < self._line.at(x) - _JUMP_S
+        return bool(x < last - self._tick_s or y < self._line.at(x) - _JUMP_S)
 
     def _is_renewal_due(self) -> bool:
         count = len(self._x)

@@ -1,24 +1,18 @@
 """What can go wrong with a force plate.
 
-    DriverError                    exit 3
-    └── HardwareError              exit 3   a plate failed
+    drivers.errors.HardwareError   exit 3
         ├── PlateNotFoundError              there is no such port, or it may not be opened
         ├── PlateRefusedError               the plate did not answer a command
         ├── PlateStalledError               no sample arrived within the deadline
         ├── PlateUnpluggedError             the port vanished while reading
         └── PlateNotStillError              the plate was loaded or shaken while it was tared
-    PlateSettingError              exit 2   a protocol name or setting that does not exist
+    drivers.errors.ConfigError     exit 2
+        └── PlateSettingError              a protocol name or setting that does not exist
 """
 
 from __future__ import annotations
 
-from drivers.errors import DriverError
-
-
-class HardwareError(DriverError):
-    """A plate or its line failed while it was used."""
-
-    exit_code = 3
+from drivers.errors import ConfigError, HardwareError
 
 
 class PlateNotFoundError(HardwareError):
@@ -77,7 +71,5 @@ class PlateNotStillError(HardwareError):
         )
 
 
-class PlateSettingError(DriverError):
+class PlateSettingError(ConfigError):
     """A protocol name or a setting that does not exist."""
-
-    exit_code = 2

@@ -14,8 +14,8 @@ from typing import Self
 
 import serial
 
+from drivers.errors import HardwareError
 from drivers.force_plate.errors import (
-    HardwareError,
     PlateNotFoundError,
     PlateNotStillError,
     PlateRefusedError,

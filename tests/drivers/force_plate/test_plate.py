@@ -8,9 +8,8 @@ import tty
 import numpy as np
 import pytest
 
-from drivers.errors import DriverError
+from drivers.errors import DriverError, HardwareError
 from drivers.force_plate.errors import (
-    HardwareError,
     PlateNotFoundError,
     PlateNotStillError,
     PlateRefusedError,
