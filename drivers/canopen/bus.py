@@ -204,6 +204,7 @@ class DriveBus:
             late_syncs=tuple(ledger.late_syncs),
             causes=tuple(ledger.causes),
             emergencies=tuple(ledger.emergencies),
+            error_frames=tuple(ledger.error_frames.items()),
             ladder=tuple(descent.ladder.history) if descent else (),
             unconfirmed=unconfirmed,
             tail=tuple(descent.tail) if descent else (),

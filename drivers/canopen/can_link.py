@@ -12,16 +12,21 @@ from drivers.canopen.config import CanConfig
 from drivers.canopen.frame import SYNC, Frame
 from drivers.errors import LinkError
 
-#: Receive stamps further than this from their arrival are not on this machine's clock (or it was stepped).
+#: Receive stamps further than this from their arrival are not on this machine's clock.
 _FOREIGN_STAMP_NS = 500_000_000
+
+#: The wall clock is slewed together with the monotonic one; a change of their distance is a step.
+_STEP_NS = 1_000_000
 
 
 class CanLink:
     """One python-can bus behind the `Link` port.
 
     Frames are stamped on the monotonic clock: the kernel's wall-clock stamp is moved over by the offset
-    between both clocks, which is taken again when a stamp shows that the wall clock was stepped.
+    between both clocks, which is taken again when the wall clock was stepped (`clock_steps` counts them).
     """
+
+    clock_steps = 0
 
     def __init__(self, config: CanConfig) -> None:
         self._config = config
@@ -113,11 +118,15 @@ class CanLink:
 
     def _stamp_ns(self, timestamp_s: float) -> int:
         arrival_ns = time.monotonic_ns()
+        offset_ns = arrival_ns - time.time_ns()
+        if abs(offset_ns - self._offset_ns) > _STEP_NS:
+            again_ns = time.monotonic_ns() - time.time_ns()  # rules out a pause between the two readings
+            if abs(again_ns - self._offset_ns) > _STEP_NS:
+                self._offset_ns = again_ns
+                self.clock_steps += 1
         stamp_ns = round(timestamp_s * 1e9) + self._offset_ns
-        if abs(arrival_ns - stamp_ns) < _FOREIGN_STAMP_NS:
-            return min(stamp_ns, arrival_ns)
-        self._offset_ns = arrival_ns - time.time_ns()
-        return arrival_ns
+        known = abs(arrival_ns - stamp_ns) < _FOREIGN_STAMP_NS
+        return min(stamp_ns, arrival_ns) if known else arrival_ns
 
 
 def _open_bus(config: CanConfig) -> Any:

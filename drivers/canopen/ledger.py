@@ -28,6 +28,7 @@ class Ledger:
         self.cycles = 0
         self.causes: list[Cause] = []
         self.emergencies: list[Emergency] = []
+        self.error_frames: dict[str, int] = {}
         self.missing: list[MissingCycle] = []
         self.torn: list[MissingCycle] = []
         self.irregular: list[MissingCycle] = []

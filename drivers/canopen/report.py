@@ -64,6 +64,7 @@ class SessionReport:
         irregular: cycles with late or duplicate frames or frames of a wrong length.
         late_syncs: cycles whose SYNC left late (the stamps say when).
         causes: what tripped, first cause first.
+        error_frames: error classes that the CAN controller reported, with their counts.
         ladder: the rungs of the stop with their times [ns].
         unconfirmed: axes that never confirmed their stop.
         tail: the samples taken while the drives were stopping.
@@ -78,6 +79,7 @@ class SessionReport:
     late_syncs: tuple[int, ...] = ()
     causes: tuple[Cause, ...] = ()
     emergencies: tuple[Emergency, ...] = ()
+    error_frames: tuple[tuple[str, int], ...] = ()
     ladder: tuple[tuple[Rung, int], ...] = ()
     unconfirmed: tuple[str, ...] = ()
     tail: tuple[CycleSample, ...] = ()

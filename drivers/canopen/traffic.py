@@ -128,9 +128,11 @@ class Traffic:
             self.ledger.trip(CauseKind.EMERGENCY, text, frame.stamp_ns, axis)
 
     def _error_frame(self, frame: Frame) -> None:
+        text = error_text(frame.identifier)
+        self.ledger.error_frames[text] = self.ledger.error_frames.get(text, 0) + 1
         if not frame.identifier & ERROR_BUS_OFF:
             return  # the controller retries by itself; what is lost shows as missing
         self.bus_off = True
-        error = BusOffError(f"error frame with {error_text(frame.identifier)}")
+        error = BusOffError(f"error frame with {text}")
         self.ledger.trip(CauseKind.BUS_OFF, str(error), frame.stamp_ns)
         raise error

@@ -79,7 +79,7 @@ def open_virtual(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
 @contextmanager
 def open_real(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
     channel = f"bench-{next(_channels)}"
-    deadlines = Deadlines(boot_s=2.0, quick_stop_s=0.6, nmt_stop_s=0.4)
+    deadlines = Deadlines(boot_s=1.0, quick_stop_s=0.6, nmt_stop_s=0.4)
     # Half a second of patience: the machine that tests may be busy with something else.
     settings = {"rate_hz": 25.0, "heartbeat_ms": 100, "heartbeat_patience": 5.0, "deadlines": deadlines}
     config = bus_config(axes, **{**settings, **changes})

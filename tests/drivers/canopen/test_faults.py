@@ -22,7 +22,7 @@ def run(open_bench, *faults, cycles=CYCLES, **changes):
         except DriveStoppedError as error:
             bench.error = error
             if bench.bus.report().unconfirmed:
-                bench.pass_time(1.5)  # what the host cannot stop stops by its missing heartbeat
+                bench.pass_time(0.8)  # what the host cannot stop stops by its missing heartbeat
         bench.stopped = bench.fleet.stopped
         report = bench.bus.report()
     assert bench.bus.close().restore_failures == () or report.causes

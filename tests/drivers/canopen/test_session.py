@@ -1,7 +1,9 @@
 """Whole sessions: long runs, random losses, stalls, silence of the host, other modes and links."""
 
+import time
 from itertools import pairwise
 
+import can
 import pytest
 
 from drivers.canopen.bus import DriveBus, Phase
@@ -124,7 +126,7 @@ def test_host_that_falls_silent_stops_the_drives(bench):
     with bench() as made:
         made.run(5)
         assert not made.fleet.stopped
-        made.pass_time(1.2)
+        made.pass_time(0.8)
         assert made.fleet.stopped
         with pytest.raises(DriveStoppedError) as caught:
             made.run_on(10)
@@ -227,14 +229,38 @@ def test_inverted_drive_and_joint_read_in_joint_sense():
 
 
 def test_foreign_sync_is_named(real_bench):
-    import can
-
     with real_bench() as made:
         made.run(3)
         with can.Bus(interface="virtual", channel=made.bus._link._config.channel) as intruder:
             intruder.send(can.Message(arbitration_id=0x80, is_extended_id=False))
             with pytest.raises(DriveStoppedError, match="SYNC too"):
                 made.run_on(3)
+
+
+def test_error_frames_are_counted(real_bench):
+    with real_bench() as made:
+        made.run(2)
+        with can.Bus(interface="virtual", channel=made.bus._link._config.channel) as sick:
+            sick.send(can.Message(arbitration_id=0x04, is_error_frame=True, data=bytes(8)))
+            made.run_on(2)
+        report = made.bus.stop()
+    assert report.outcome == "complete"
+    assert report.error_frames == (("controller problem", 1),)
+
+
+def test_a_stepped_wall_clock_does_not_move_the_stamps(monkeypatch):
+    link = CanLink(CanConfig(interface="virtual", channel="stepped"))
+    wall_s, wall_ns = time.time, time.time_ns
+    with can.Bus(interface="virtual", channel="stepped") as other:
+        for step_s in (0.0, 0.2, -3600.0):
+            monkeypatch.setattr(time, "time", lambda step_s=step_s: wall_s() + step_s)
+            monkeypatch.setattr(time, "time_ns", lambda step_s=step_s: wall_ns() + round(step_s * 1e9))
+            before_ns = time.monotonic_ns()
+            other.send(can.Message(arbitration_id=0x181, is_extended_id=False))
+            frame = link.receive(before_ns + 1_000_000_000)
+            assert before_ns - 1_000_000 <= frame.stamp_ns <= time.monotonic_ns()
+    link.close()
+    assert link.clock_steps == 2
 
 
 @pytest.mark.parametrize("settings", [{"kernel_sync": True}, {"own_echo": False}])
