@@ -25,8 +25,8 @@ class Consistency:
     """Whether an estimate is physically possible, and the nearest one that is.
 
     Attributes:
-        consistent: bodies with positive definite pseudo-inertia, rotor inertias, friction and torque constants of
-            the right sign exist that have exactly the estimated parameters.
+        consistent: bodies with positive definite pseudo-inertia exist that have exactly the estimated
+            parameters; rotor inertias, friction and torque constants have the right sign.
         within_uncertainty: such ones exist inside the estimate's confidence region.
         distance: Mahalanobis distance to the nearest consistent parameters [std], 0 where consistent.
         limit: radius of the confidence region [std].
@@ -92,9 +92,8 @@ def _estimate(model: Model, theta: FloatArray, constants: FloatArray, covariance
     rigid = np.flatnonzero(known[: len(model.basis.names)])
     # what of the model's covariance is not known carries no information
     kept = np.where(np.outer(known, known), covariance, np.nan)
-    return _Estimate(
-        np.where(known, values, np.nan), kept, rigid, model.basis.definitions[rigid], sign_bounds(model, known)
-    )
+    signs = sign_bounds(model, known)
+    return _Estimate(np.where(known, values, np.nan), kept, rigid, model.basis.definitions[rigid], signs)
 
 
 def _whitening(covariance: FloatArray) -> FloatArray:
@@ -120,7 +119,8 @@ def check_consistency(
         The verdict, the projection and one full set of bodies.
 
     Source:
-        Pseudo-inertia: Wensing, Kim, Slotine, RA-L 3(1) 2018; Sousa, Cortesao, IJRR 33(6) 2014 (semidefinite programme).
+        Pseudo-inertia: Wensing, Kim, Slotine, RA-L 3(1) 2018; as a semidefinite programme: Sousa, Cortesao,
+        IJRR 33(6) 2014.
     """
     n = model.robot.n
     constants = np.full(n, np.nan) if torque_constants is None else torque_constants
@@ -198,19 +198,22 @@ def _sentence(
 ) -> str:
     if consistent:
         return (
-            "consistent: bodies with positive mass and positive definite pseudo-inertia exist that have exactly these "
-            "base parameters, and friction and motor constants have the right sign."
+            "consistent: bodies with positive mass and positive definite pseudo-inertia exist that have "
+            "exactly these base parameters, and friction and motor constants have the right sign."
         )
-    names = [p.name for p in model.parameters] + [f"{name}.torque_constant" for name in model.robot.joint_names]
+    names = [parameter.name for parameter in model.parameters]
+    names += [f"{joint}.torque_constant" for joint in model.robot.joint_names]
     worst = int(np.nanargmax(np.abs(shift)))
-    cause = "; ".join(broken) if broken else "no bodies with positive definite pseudo-inertia have these base parameters"
+    impossible = "no bodies with positive definite pseudo-inertia have these base parameters"
+    cause = "; ".join(broken) or impossible
     moves = f"the largest shift to get there is {names[worst]} by {shift[worst]:+.2g} std"
     if distance <= limit:
         return (
-            f"inconsistent at the estimate but within its uncertainty: {cause}; consistent parameters lie {distance:.2g} std away, "
-            f"inside the {CONFIDENCE:.0%} region of {limit:.2g} std; {moves}."
+            f"inconsistent at the estimate but within its uncertainty: {cause}; consistent parameters lie "
+            f"{distance:.2g} std away, inside the {CONFIDENCE:.0%} region of {limit:.2g} std; {moves}."
         )
     return (
-        f"inconsistent: {cause}; the nearest consistent parameters lie {distance:.3g} std away, outside the {CONFIDENCE:.0%} region of "
-        f"{limit:.2g} std, so a structural error (geometry, friction, timing) is likely; {moves}."
+        f"inconsistent: {cause}; the nearest consistent parameters lie {distance:.3g} std away, outside the "
+        f"{CONFIDENCE:.0%} region of {limit:.2g} std, so a structural error (geometry, friction, timing) is "
+        f"likely; {moves}."
     )

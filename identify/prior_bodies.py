@@ -1,4 +1,4 @@
-"""Prior bodies: what a link is taken to be where the data leave it open, and the unit its inertia is measured in."""
+"""Prior bodies: what a link is taken to be where the data leave it open; also the unit of its inertia."""
 
 from __future__ import annotations
 

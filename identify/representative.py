@@ -62,8 +62,9 @@ def nearest_to_prior(space: BodySpace, rows: FloatArray, start: FloatArray) -> F
         decrease = -float(slope @ step)
         if decrease < _CONVERGED:
             break
-        length = 1.0
-        while (moved := divergence(space, z + length * step)) > value - 0.1 * length * decrease and length > 1e-12:
+        length, moved = 1.0, divergence(space, z + step)
+        while moved > value - 0.1 * length * decrease and length > 1e-12:
             length *= 0.5
+            moved = divergence(space, z + length * step)
         z, value = z + length * step, min(moved, value)
     return z

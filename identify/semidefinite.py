@@ -13,6 +13,8 @@ from identify.rotations import FloatArray
 
 # least eigenvalue of a body in units of the prior's: thinner bodies count as flat
 MARGIN = 1e-6
+# price of one prior-sized body in half squared std: without it the nearest point may lie at infinite mass
+_SIZE_PRICE = 1e-3
 _ENOUGH = 1.0  # no need to look for a body rounder than the prior
 _SOLVED = ("Solved", "AlmostSolved")
 
@@ -39,7 +41,9 @@ def _cones(space: BodySpace) -> list[Any]:
     return cones + ([clarabel.NonnegativeConeT(space.rotors)] if space.rotors else [])
 
 
-def _solve(quadratic: FloatArray, linear: FloatArray, a: FloatArray, b: FloatArray, cones: list[Any]) -> FloatArray:
+def _solve(
+    quadratic: FloatArray, linear: FloatArray, a: FloatArray, b: FloatArray, cones: list[Any]
+) -> FloatArray:
     """Minimise x'Qx/2 + c'x subject to b - A x in the cones."""
     import clarabel
     from scipy import sparse
@@ -91,7 +95,11 @@ def roundest(space: BodySpace, rows: FloatArray, values: FloatArray) -> FloatArr
 
 
 def nearest(
-    space: BodySpace, rows: FloatArray, signs: tuple[FloatArray, FloatArray], whiten: FloatArray, values: FloatArray
+    space: BodySpace,
+    rows: FloatArray,
+    signs: tuple[FloatArray, FloatArray],
+    whiten: FloatArray,
+    values: FloatArray,
 ) -> Nearest:
     """Find the possible bodies (and signed parameters) nearest to an estimate.
 
@@ -121,7 +129,8 @@ def nearest(
     quadratic = np.zeros((variables, variables))
     quadratic[size + s :, size + s :] = np.eye(k)
     cones = [clarabel.ZeroConeT(k), *([clarabel.NonnegativeConeT(c)] if c else []), *_cones(space)]
-    x = _solve(quadratic, np.zeros(variables), a, b, cones)
+    linear = np.concatenate([_SIZE_PRICE * space.prior, np.zeros(s + k)])
+    x = _solve(quadratic, linear, a, b, cones)
     z = x[:size] + max(0.0, 0.5 * MARGIN - space.margin(x[:size])) * space.prior
     rest = whiten @ (values - effect @ np.concatenate([z, x[size : size + s]]))
     return Nearest(z, x[size : size + s], float(np.linalg.norm(rest)))

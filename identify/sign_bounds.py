@@ -1,4 +1,4 @@
-"""Parameters whose sign physics prescribes: friction dissipates, a torque constant keeps its motor's direction."""
+"""Parameters whose sign physics prescribes: friction dissipates, a motor keeps its direction."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from typing import Any
 from daq.recording import Recording
 from identify.fit import Fit, FitOptions, fit
 from identify.validation import Validation, validate
+from service.consistency_entry import check_fit, consistency_entry, projection_entry
 from service.datasets import dataset_of, open_recording
 from service.errors import LogError
 from service.estimate_file import estimate_content
@@ -78,6 +79,8 @@ def identify_log(
     robot: str | None,
     options: FitOptions,
     validate_path: str | Path | None = None,
+    *,
+    project: bool = False,
 ) -> Identification:
     """Identify a log.
 
@@ -86,6 +89,7 @@ def identify_log(
         robot: preset name or path of the robot file; None takes the log's own.
         options: what to fit and how.
         validate_path: a held-out log to predict.
+        project: whether to add the nearest physically consistent parameters.
 
     Returns:
         The identification.
@@ -102,5 +106,9 @@ def identify_log(
     validation = None
     if held_out is not None:
         validation = (held_out, validate(result, dataset_of(held_out, loaded)))
-    content = estimate_content(result, loaded, recording, options.estimator, validation)
+    consistency = check_fit(result)
+    extra = {"consistency": consistency_entry(consistency)}
+    if project:
+        extra |= projection_entry(result.model, consistency)
+    content = estimate_content(result, loaded, recording, options.estimator, validation, extra)
     return Identification(loaded, recording, result, validation, content)

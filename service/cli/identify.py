@@ -23,6 +23,7 @@ def identify(
     bandwidth: Annotated[float | None, typer.Option(help="Non-periodic: cut-off of the differentiating filter [Hz].")] = None,
     decimate: Annotated[int | None, typer.Option(help="Non-periodic: keep every so many samples after filtering.", min=1)] = None,
     trim: Annotated[int, typer.Option(help="Non-periodic: samples to drop at either end.", min=0)] = 0,
+    project: Annotated[bool, typer.Option("--project", help="Add the nearest physically consistent parameters.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the estimate as JSON.")] = False,
 ) -> None:
     """Identify parameters, torque constants and their covariance from a log.
@@ -43,7 +44,7 @@ def identify(
         free=FreeOptions(bandwidth, decimate, trim),
         nominal_constants=nominal_constants,
     )
-    found = identify_log(run, robot, options, validate)
+    found = identify_log(run, robot, options, validate, project=project)
     if output is not None:
         write_text(output, to_json(found.content), "the estimate")
     if as_json:
@@ -113,5 +114,17 @@ def _print_fit(out: Console, content: dict[str, Any]) -> None:
     consistency = content.get("consistency")
     if consistency:
         out.print(f"Physical consistency: {consistency['sentence']}", markup=False)
+    if "projection" in content:
+        _print_projection(out, content)
     for warning in content["warnings"]:
         out.print(f"Warning: {warning}", markup=False)
+
+
+def _print_projection(out: Console, content: dict[str, Any]) -> None:
+    from service.cli.output import table
+
+    moved = sorted((p for p in content["projected"] if abs(p["shift"]) >= 0.05), key=lambda p: -abs(p["shift"]))
+    if moved:
+        rows = [(p["name"], f"{p['value']:.4g}", f"{p['shift']:+.2f}") for p in moved]
+        out.print(table("Projected (shift in std)", ("name", "value", "shift"), rows))
+    out.print(content["projection"], markup=False)
