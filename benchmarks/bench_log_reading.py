@@ -161,7 +161,7 @@ def main():
         whole = median_ms(lambda: write_recording(recording, path), 5)
     print(f"log: {SECONDS} s, 3 topics, {RATE_HZ} Hz, {3 * SECONDS * RATE_HZ} messages")
     print(
-        f"read   residuum {mine:8.1f} ms   mcap-ros2-support {reference:8.1f} ms ({reference / mine:.1f} x)   "
+        f"read   residuum {mine:8.1f} ms  mcap-ros2-support {reference:8.1f} ms ({reference / mine:.1f} x)   "
         f"rosbags {rosbags:8.1f} ms ({rosbags / mine:.1f} x)"
     )
     print(

@@ -6,6 +6,7 @@ import hashlib
 import struct
 import zlib
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -175,6 +176,15 @@ def open_log(path: str | Path) -> LogFile:
     path = Path(path)
     raw = load_bytes(path)
     pieces = _Pieces(str(path), memoryview(raw))
+    with ThreadPoolExecutor(1) as beside:  # hashing holds no interpreter lock: free on a second core
+        digest = beside.submit(lambda: hashlib.sha256(raw).hexdigest())
+        offsets, headers, buffer = _parse(path, pieces)
+        return LogFile(str(path), pieces.profile, pieces.schemas, pieces.channels, pieces.metadata,
+                       pieces.attachments, buffer, offsets, headers, digest.result(), _oddities(pieces))
+
+
+def _parse(path: Path, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Offsets, headers and bytes of all messages."""
     try:
         _check_end(pieces.data)
         _collect(pieces)
@@ -182,10 +192,7 @@ def open_log(path: str | Path) -> LogFile:
         raise DamagedLogError(str(path), error.offset, error.reason) from error
     buffer = np.frombuffer(b"".join(pieces.blocks), np.uint8)
     offsets, headers = _find_messages(pieces, buffer)
-    warnings = _oddities(pieces)
-    return LogFile(str(path), pieces.profile, pieces.schemas, pieces.channels, pieces.metadata,
-                   pieces.attachments, buffer, offsets, headers, hashlib.sha256(raw).hexdigest(),
-                   warnings)
+    return offsets, headers, buffer
 
 
 def _oddities(pieces: _Pieces) -> tuple[str, ...]:
