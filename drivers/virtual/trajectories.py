@@ -74,7 +74,7 @@ def random_fourier(
     """Random excitation inside `share` of the URDF's angle and speed limits; no optimum, but rich."""
     random = np.random.default_rng(seed)
     lower, upper, speed = joint_limits(plant)
-    shape = random.standard_normal((2, len(lower), harmonics))
+    shape = random.standard_normal((2, len(lower), harmonics)) / np.arange(1, harmonics + 1)
     motion = FourierMotion(fundamental_hz, np.zeros(len(lower)), shape[0], shape[1])
     t_s = np.linspace(0.0, motion.duration_s, 2000)
     q = motion.position(t_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drivers.virtual.effects.effect import Effect, Range
+from drivers.virtual.errors import PlantError
 from drivers.virtual.plant_file import PlantSpec
 
 
@@ -21,6 +22,10 @@ class RotorInertia(Effect):
     def alter(self, plant: PlantSpec) -> PlantSpec:
         """The plant with its true rotor."""
         joint = plant.joints[self.j]
+        if joint.rotor_inertia_kg_m2 == 0.0:
+            raise PlantError(
+                f"{joint.name} has no rotor inertia that could be wrong: give it one in the plant."
+            )
         true = joint.model_copy(
             update={"rotor_inertia_kg_m2": joint.rotor_inertia_kg_m2 * (1.0 + self.p["share"])}
         )

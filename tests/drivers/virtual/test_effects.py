@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from drivers.virtual.effects.draw import draw_effect
 from drivers.virtual.effects.effect import CHANNELS, EffectSpec
 from drivers.virtual.effects.registry import (
     catalogued,
@@ -296,3 +297,13 @@ def test_saturation_inverts_its_own_law(quiet_arm, motion, base):
     spec = spec_of("torque_constant_saturation", coefficient_1_a2=1e-3)
     amps = streams(quiet_arm, motion, spec)["currents"][:, 1]
     assert np.allclose(amps * (1.0 - 1e-3 * amps**2), base["currents"][:, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(effect_classes()))
+def test_drawn_effects_can_be_built(name, arm):
+    random = np.random.default_rng(1)
+    for _ in range(3):
+        drawn = draw_effect(arm, name, random)
+        effect = make_effects([drawn], arm)[0]
+        assert effect.p == dict(drawn.parameters)
+        assert (drawn.joint is not None) == (effect.place == "joint")

@@ -130,3 +130,21 @@ def test_the_bearing_moment_of_joint_one_is_the_moment_above_it(arm, states):
     about_origin = loads.wrench[:, 3:] - np.cross(base.com_m, [0.0, 0.0, weight])
     above = about_origin - np.cross([0.0, 0.0, 1.02], force)
     assert np.allclose(loads.tilting_nm[:, 0], np.linalg.norm(above[:, :2], axis=1), rtol=1e-3)
+
+
+def test_the_reference_arms_base_parameters_are_the_published_ones(arm):
+    """Kr111, Kd2, b31, b32 and b21 of the paper's table, from the inertials by hand."""
+
+    def about_joint(link):
+        x, y, z = link.com_m
+        squares = np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+        return np.array(link.inertia_kg_m2[:3]) + link.mass_kg * squares
+
+    one, two, three = (about_joint(link) for link in arm.links[1:])
+    upper, lower = arm.links[3], arm.links[2]
+    reach = 0.48
+    carried = upper.mass_kg * reach**2
+    assert one[2] + two[0] + carried + three[0] == pytest.approx(18.2649, abs=2e-3)
+    assert two[2] - two[0] - carried == pytest.approx(-10.2864, abs=2e-3)
+    assert upper.mass_kg * np.array(upper.com_m)[[0, 2]] == pytest.approx([0.6208, 2.8214], abs=1e-3)
+    assert lower.mass_kg * lower.com_m[2] + upper.mass_kg * reach == pytest.approx(16.7748, abs=1e-3)
