@@ -11,9 +11,12 @@ from identify.filters import AntiAliasFilter
 from identify.period import PeriodWindow
 from identify.rotations import FloatArray
 
-# chance that a line of pure noise is kept, per line; a false line costs one amplitude std, a lost one its acceleration
-_FALSE_LINE = 1e-4
+# chance that any line of pure noise is kept in a whole run: one false line at a high frequency is little
+# motion but much acceleration, and would feign a misfit
+_FALSE_LINES = 1e-3
+_FLOOR_WIDTH = 41  # lines the noise floor is averaged over
 _FIRST_LINES = 20
+_PASSES = 3  # a strong line that the first fit lacks leaks into others until the fit has it
 
 
 @dataclass(frozen=True)
@@ -131,34 +134,46 @@ def significant_lines(position: Signal, window: PeriodWindow, first: FourierTraj
     Returns:
         Harmonic numbers to keep, those of the first fit that are significant included.
     """
-    bins = max(int(round(position.rate_hz * window.period_s)), 8)
     rest = position.values - first.evaluate(position.t_s)[0]
-    phase = (position.t_s - window.start_s) / window.period_s
-    period = np.clip(phase.astype(int), 0, window.periods - 1)
-    index = period * bins + np.minimum(((phase - period) * bins).astype(int), bins - 1)
-    counts = np.bincount(index, minlength=window.periods * bins)
+    tables = _period_tables(position.t_s, rest, window)
+    bins = tables.shape[2]
     keep = np.zeros(bins // 2 + 1, dtype=bool)
-    for joint in range(len(rest)):
-        sums = np.bincount(index, rest[joint], minlength=window.periods * bins)
-        table = (sums / np.maximum(counts, 1)).reshape(window.periods, bins)
-        keep |= _lines_above_noise(np.fft.rfft(table, axis=1) / bins, first, joint)
+    chance = _FALSE_LINES / (len(rest) * len(keep))
+    for joint, table in enumerate(tables):
+        keep |= _lines_above_noise(np.fft.rfft(table, axis=1) / bins, first, joint, chance)
     keep[0] = False
     # beyond 0.4 of the sampling rate an averaged encoder has no motion to show
     keep[int(0.8 * bins / 2) :] = False
     return np.flatnonzero(keep)
 
 
-def _lines_above_noise(spectra: FloatArray, first: FourierTrajectory, joint: int) -> FloatArray:
-    """Lines whose mean over the periods exceeds its own scatter; spectra (M, lines)."""
+def _period_tables(t_s: FloatArray, values: FloatArray, window: PeriodWindow) -> FloatArray:
+    """Arrange samples (n, N) by period and nearest place in it, shape (n, M, bins); empty places are zero."""
+    rate_hz = 1.0 / np.median(np.diff(t_s))
+    bins = max(round(rate_hz * window.period_s), 8)
+    phase = (t_s - window.start_s) / window.period_s * bins
+    shift = np.angle(np.mean(np.exp(2j * np.pi * phase))) / (2.0 * np.pi)  # centre the samples in their bins
+    index = np.round(phase - shift).astype(int) % (window.periods * bins)
+    counts = np.maximum(np.bincount(index, minlength=window.periods * bins), 1)
+    sums = [np.bincount(index, row, minlength=window.periods * bins) / counts for row in values]
+    return np.array(sums).reshape(len(values), window.periods, bins)
+
+
+def _lines_above_noise(
+    spectra: FloatArray, first: FourierTrajectory, joint: int, chance: float
+) -> FloatArray:
+    """Lines whose mean over the periods exceeds its own scatter; spectra (M, lines), chance per line."""
     periods = len(spectra)
     mean = spectra.mean(axis=0)
     power = np.mean(np.abs(spectra - mean) ** 2, axis=0) * periods / max(periods - 1, 1)
-    width = min(41, len(power) // 2 * 2 - 1)
+    width = min(_FLOOR_WIDTH, len(power) // 2 * 2 - 1)
     kernel = np.ones(width) / width
     floor = np.convolve(np.pad(power, width // 2, mode="reflect"), kernel, mode="valid")[: len(power)]
     mean = mean.copy()
     mean[first.lines] += 0.5 * (first.cosine[joint] - 1j * first.sine[joint])
-    threshold = -np.log(_FALSE_LINE)  # |line|^2 / variance of the mean is exponential under noise
+    # |line|^2 over the variance of the mean is exponential under noise; over an estimate of it F(2, 2 d)
+    d = width * max(periods - 1, 1)
+    threshold = d * (chance ** (-1.0 / d) - 1.0)
     return np.abs(mean) ** 2 > threshold * np.maximum(floor / periods, 1e-32)
 
 
@@ -189,10 +204,12 @@ def fit_trajectory(position: Signal, window: PeriodWindow, excited: int | None =
     nyquist = int(0.4 * position.rate_hz * window.period_s)
     first_count = max(1, min(max(_FIRST_LINES, excited or 0), nyquist))
     first = fit_lines(cut, window, np.arange(1, first_count + 1))
-    lines = significant_lines(cut, window, first)
-    if excited:
-        lines = np.union1d(lines, np.arange(1, min(excited, nyquist) + 1))
-    if len(lines) == 0:
-        lines = np.array([1])
-    return fit_lines(cut, window, lines)
-
+    commanded = np.arange(1, min(excited or 0, nyquist) + 1)
+    for _ in range(_PASSES):
+        lines = np.union1d(significant_lines(cut, window, first), commanded)
+        lines = lines if len(lines) else np.array([1])
+        unchanged = np.array_equal(lines, first.lines)
+        first = first if unchanged else fit_lines(cut, window, lines)
+        if unchanged:
+            break
+    return first
