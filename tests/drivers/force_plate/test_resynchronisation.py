@@ -155,3 +155,13 @@ def test_counts_add_up():
     framer = Framer(SINGLE["bota"].frame_format)
     framer.feed(b"xyz" + frames[0] + frames[1][:20] + b"".join(frames[2:]))
     assert (framer.counts.frames, framer.counts.skipped_bytes) == (9, 23)
+
+
+@pytest.mark.parametrize("size", [1, 3, 100])
+def test_a_frame_hidden_in_a_phantom_that_passed_a_strong_check_is_still_found(size):
+    """A cut frame in step whose checksum happens to fit is taken at once; the frame inside it comes too."""
+    lucky = FrameFormat(4, b"H", 0, lambda frame: frame[-1:] == b"T", is_strong=True)
+    framer = Framer(lucky)
+    stream = b"HabT" + b"Ha" + b"HTcT" + b"HdeT" + b"HfgT"
+    found = [f for at in range(0, len(stream), size) for f in framer.feed(stream[at : at + size])]
+    assert found + framer.flush() == [b"HabT", b"HaHT", b"HTcT", b"HdeT", b"HfgT"]
