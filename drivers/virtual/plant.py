@@ -54,6 +54,10 @@ class VirtualPlant:
         self._load_effects = [effect for effect in self.effects if effect.needs_loads]
         self._tick(self._servo.at(np.array([start_s])))
         self._constant = np.array([joint.torque_constant_nm_a for joint in spec.joints])
+        self._coulomb = np.array([joint.coulomb_nm for joint in spec.joints])
+        self._viscous = np.array([joint.viscous_nm_s for joint in spec.joints])
+        self._offset = np.array([joint.offset_nm for joint in spec.joints])
+        self._springs = [(i, joint.spring) for i, joint in enumerate(spec.joints) if joint.spring is not None]
         self._to_motor = np.linalg.inv(self.rigid.coupling)  # (k, k): motor torque = joint torque @ this
 
     def _using(self, hook: str) -> list[Effect]:
@@ -125,12 +129,11 @@ class VirtualPlant:
     def torques(self, moments: Moments) -> np.ndarray:
         """Torque (n, k) the motors must bring to the joint side, with friction, springs and offsets."""
         loads = self.loads(moments)
-        torque = loads.joint_nm.copy()
-        for index, joint in enumerate(self.spec.joints):
-            torque[:, index] += joint.coulomb_nm * moments.direction[:, index]
-            torque[:, index] += joint.viscous_nm_s * moments.qd[:, index] + joint.offset_nm
-            if joint.spring is not None:
-                torque[:, index] += spring_torque(joint.spring, moments.q[:, index])
+        torque = (
+            loads.joint_nm + self._coulomb * moments.direction + self._viscous * moments.qd + self._offset
+        )
+        for index, spring in self._springs:
+            torque[:, index] += spring_torque(spring, moments.q[:, index])
         for effect in self._using("torque"):
             torque += effect.torque(moments, loads)
         return torque
