@@ -253,3 +253,17 @@ def box_around_plate(robot: Robot, size_m: tuple[float, float, float]) -> Box | 
     half = np.array([size_m[0] / 2.0, size_m[1] / 2.0, 0.0])
     top = robot.plate.translation_m
     return Box(top - half - np.array([0.0, 0.0, size_m[2]]), top + half, "the force plate")
+
+
+def always_meeting(
+    robot: Robot, spheres: tuple[Sphere, ...], pairs: tuple[tuple[int, int], ...]
+) -> tuple[tuple[int, int], ...]:
+    """Find the pairs that overlap in every pose: neighbours in shape, if not in the chain."""
+    if not pairs:
+        return ()
+    rng = np.random.default_rng(3)
+    lower = np.array([max(joint.limits.lower, -np.pi) for joint in robot.joints])
+    upper = np.array([min(joint.limits.upper, np.pi) for joint in robot.joints])
+    q = rng.uniform(lower[:, None], upper[:, None], (robot.n, 200))
+    found = clearances(robot, Workspace(spheres, pairs=pairs, margin_m=0.0), q)
+    return tuple(pair for pair, gap in zip(pairs, found.distance_m, strict=True) if gap.max() < 0.0)

@@ -1,0 +1,296 @@
+"""The whole chain: locate, name, model, show, and say what could not be seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from identify.blocks import residual
+from identify.dataset import Dataset
+from identify.diagnosis.adequacy import Adequacy, examine
+from identify.diagnosis.augmented import Augmented, augment
+from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, progressive_tests
+from identify.diagnosis.blind_spots import blind_spots, place_name
+from identify.diagnosis.describe import carrying_channels, parameters_of, sentence_of, where_of
+from identify.diagnosis.findings import ChannelFit, Diagnosis, Finding, FoundParameter, Unexplained, Where, rounded
+from identify.diagnosis.held_out import held_out
+from identify.diagnosis.locate import locate
+from identify.diagnosis.problem import Problem, build_problem
+from identify.diagnosis.select import Named, Selection, backward, extend, select, tangent_columns
+from identify.fit import Fit
+from identify.physics.catalogue import catalogue
+from identify.physics.effect import Effect
+from identify.rotations import FloatArray
+
+# family-wise levels; together the chance that a recording of the model plus noise raises any alarm is 1 %
+LEVEL_NAMED = 0.006
+LEVEL_REST = 0.002
+LEVEL_PROGRESS = 0.001
+LEVEL_CONSTANT = 0.001
+# a name stands only where what it leaves on its own channels is small against what it explains
+_LEFTOVER = 0.25
+_SEED = 20240229  # the diagnosis of a recording must not change from run to run
+
+
+@dataclass(frozen=True)
+class DiagnoseOptions:
+    """How to diagnose.
+
+    Attributes:
+        effects: names of the effects to consider; None takes the whole catalogue.
+        level: multiplies all significance levels; 1 gives 1 % false alarms a recording.
+    """
+
+    effects: tuple[str, ...] | None = None
+    level: float = 1.0
+
+
+def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | None = None) -> Diagnosis:
+    """Find the physics that a fit lacks.
+
+    Args:
+        fit: the fit of the run.
+        other: a recording not used in the fit.
+        options: effects and levels.
+
+    Returns:
+        The diagnosis.
+    """
+    options = options or DiagnoseOptions()
+    rng = np.random.default_rng(_SEED)
+    effects = [e for e in catalogue().values() if options.effects is None or e.name in options.effects]
+    problem = build_problem(fit)
+    progress = _progress(problem, effects, LEVEL_PROGRESS * options.level)
+    problem = _with_progress(problem, progress)
+    selection = backward(problem, select(problem, effects, LEVEL_NAMED * options.level, rng), LEVEL_NAMED * options.level)
+    selection, rest = _gate(problem, selection, options)
+    augmented = augment(problem, [item.trial for item in selection.named])
+    shown = held_out(fit, augmented, other, rng) if other is not None else None
+    findings = _findings(problem, selection, augmented)
+    findings += _constant_findings(problem, augmented, rest, LEVEL_CONSTANT * options.level)
+    findings += tuple(_progress_finding(problem, item, rivals) for item, rivals in progress)
+    tones = foreign_tones(problem)
+    unexplained = _unexplained(problem, rest, tones, options)
+    spots = blind_spots(problem, effects, selection.first, selection.null, LEVEL_NAMED * options.level)
+    return Diagnosis(
+        _verdict(findings, unexplained, fit),
+        findings,
+        unexplained,
+        tuple(spots),
+        _training(problem, augmented),
+        shown,
+        locate(fit),
+        None,
+        rest.structures,
+        (),
+        _warnings(fit),
+        {},
+    )
+
+
+def _warnings(fit: Fit) -> tuple[str, ...]:
+    return tuple(w for w in fit.warnings if not w.startswith("The model does not fit"))
+
+
+def _progress(problem: Problem, effects: list[Effect], level: float) -> list[tuple[Progress, tuple[str, ...]]]:
+    """Progressive effects that stand out, one a joint or channel, with those that look alike."""
+    tests = [item for item in progressive_tests(problem, effects) if item.p_value <= level]
+    result: list[tuple[Progress, tuple[str, ...]]] = []
+    while tests and len(result) < 3:
+        best = max(tests, key=lambda item: item.gain - 9.0 * item.width)
+        same = [t for t in tests if t is not best and _overlap(problem, t, best)]
+        near = [t for t in same if t.effect.name != best.effect.name and t.gain > best.gain - 6.0 - 9.0 * (best.width - t.width)]
+        result.append((best, tuple(dict.fromkeys(t.effect.name for t in near))[:4]))
+        tests = [t for t in tests if t is not best and t not in same]
+    return result
+
+
+def _overlap(problem: Problem, first: Progress, second: Progress) -> bool:
+    """Whether two changes concern a common channel: then they may be one and the same."""
+
+    def channels(item: Progress) -> set[str]:
+        columns = problem.columns(item.effect, item.place, _grid_middle(item.effect))
+        return set(carrying_channels(problem, columns @ np.ones(columns.shape[1])))
+
+    return bool(channels(first) & channels(second))
+
+
+def _grid_middle(effect: Effect) -> dict[str, float]:
+    return {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
+
+
+def _with_progress(problem: Problem, progress: list[tuple[Progress, tuple[str, ...]]]) -> Problem:
+    """Let the mean over the periods of what changes join the baseline: a ramp is a sawtooth of every period."""
+    if not progress:
+        return problem
+    columns = []
+    for item, _ in progress:
+        raw = problem.raw_columns(item.effect, item.place, _grid_middle(item.effect))
+        shaped = [part * block.grid_s / block.grid_s[-1] for part, block in zip(raw, problem.blocks, strict=True)]
+        columns.append(problem.whiten(shaped))
+    stacked = np.hstack(columns)
+    basis = extend(problem.basis, stacked)
+    solution = problem.fit.solution
+    rest = solution.whitened - basis @ (basis.T @ solution.whitened)
+    solution = replace(solution, whitened=rest, jacobian=np.hstack([solution.jacobian]))
+    changed = Problem(replace(problem.fit, solution=solution), problem.scenes)
+    changed.__dict__["basis"] = basis
+    return changed
+
+
+def _gate(problem: Problem, selection: Selection, options: DiagnoseOptions) -> tuple[Selection, Adequacy]:
+    """Take back names that leave too much on their own channels; examine what is left."""
+    level = LEVEL_REST * options.level
+    rest = examine(problem, selection.basis, selection.residual)
+    kept = [item for item in selection.named if not _leaves_too_much(problem, item, rest, level)]
+    if len(kept) == len(selection.named):
+        return selection, rest
+    basis = problem.basis
+    for item in kept:
+        columns = problem.columns(item.trial.effect, item.trial.place, item.trial.shape)
+        basis = extend(basis, np.hstack([columns, tangent_columns(problem, item.trial)]))
+    residual = problem.residual - basis @ (basis.T @ problem.residual)
+    selection = Selection(tuple(kept), basis, residual, selection.null, selection.first)
+    return selection, examine(problem, basis, residual)
+
+
+def _leaves_too_much(problem: Problem, item: Named, rest: Adequacy, level: float) -> bool:
+    trial = item.trial
+    whitened = problem.columns(trial.effect, trial.place, trial.shape) @ trial.values
+    home = carrying_channels(problem, whitened)
+    left = [s.gain - s.width for s in rest.structures if s.p_value < level and s.channel in home]
+    left += [rest.excess[c] for c, p in rest.channel_p.items() if p < level / len(rest.channel_p) and c in home]
+    return bool(left) and max(left) > _LEFTOVER * trial.gain
+
+
+def _findings(problem: Problem, selection: Selection, augmented: Augmented) -> tuple[Finding, ...]:
+    result = []
+    for named, item in zip(selection.named, augmented.additions, strict=True):
+        parameters = parameters_of(problem, item)
+        alternatives = tuple(dict.fromkeys(r.effect.name for r in named.rivals if r.effect.name != item.effect.name))[:4]
+        p = selection.null.p_value(float(stats.chi2.logsf(item.delta_chi2, max(item.freedom, 1))))
+        joint = problem.scene.robot.joints[item.place.joint].name if item.place.joint is not None else None
+        result.append(
+            Finding(
+                item.effect.name, joint, item.place.channel, parameters, max(p, 1e-300), item.delta_chi2, alternatives,
+                where_of(problem, item), sentence_of(problem, item, parameters),
+            )
+        )
+    return tuple(result)
+
+
+def _constant_findings(problem: Problem, augmented: Augmented, rest: Adequacy, level: float) -> tuple[Finding, ...]:
+    """Torque constants that differ from the robot file, where they were estimated and their joint is clean."""
+    fit, result = problem.fit, []
+    count = len(fit.model.parameters)
+    free = fit.solution.free_scales
+    dirty = {s.channel for s in rest.structures if s.p_value < LEVEL_REST}
+    for column, joint in enumerate(free):
+        name = fit.model.robot.joints[joint].name
+        nominal = fit.model.robot.joints[joint].drive.torque_constant
+        if nominal is None or name in dirty or not fit.solution.identifiable[count + column]:
+            continue
+        scale, std = augmented.scale[joint], float(np.sqrt(augmented.baseline_covariance[count + column, count + column]))
+        z = (scale - 1.0) / std
+        p = float(min(1.0, len(free) * 2.0 * stats.norm.sf(abs(z))))
+        if p > level:
+            continue
+        value, value_std = 1.0 / scale - 1.0, std / scale**2
+        sentence = (
+            f"{name[0].upper() + name[1:]}'s torque constant is {nominal / scale:.4g} N.m/A, {100 * value:+.1f} % ± {100 * value_std:.1f} % "
+            f"from the robot file's {nominal:.4g} N.m/A."
+        )
+        parameters = (
+            FoundParameter("e", value, value_std, ""),
+            FoundParameter("torque_constant", nominal / scale, nominal * value_std, "N.m/A"),
+        )
+        result.append(
+            Finding("torque_constant_error", name, None, parameters, max(p, 1e-300), float(z**2), (), Where((name,), "the whole motion", ()), sentence)
+        )
+    return tuple(result)
+
+
+def _progress_finding(problem: Problem, item: Progress, rivals: tuple[str, ...]) -> Finding:
+    window = problem.fit.window
+    assert window is not None
+    parameters = []
+    for coefficient, value, std in zip(item.effect.coefficients, item.values, item.std, strict=True):
+        unit = f"{coefficient.unit}/s" if item.course == "ramp" else coefficient.unit
+        parameters.append(FoundParameter(coefficient.name, float(value), float(std), unit))
+    if item.time_constant_s is not None:
+        parameters.append(FoundParameter("time_constant", item.time_constant_s, None, "s"))
+    joint = problem.scene.robot.joints[item.place.joint].name if item.place.joint is not None else None
+    place = place_name(problem, item.place)
+    course = "steadily over the run" if item.course == "ramp" else f"settling within about {item.time_constant_s:.3g} s"
+    numbers = ", ".join(f"{p.name} {rounded(p.value, p.std)} {p.unit}" for p in parameters if p.name != "time_constant")
+    columns = problem.columns(item.effect, item.place, _grid_middle(item.effect))
+    channels = carrying_channels(problem, columns @ item.values)
+    return Finding(
+        item.effect.name, joint, item.place.channel, tuple(parameters), max(item.p_value, 1e-300), item.gain, rivals,
+        Where(channels, "changing from period to period", ()),
+        f"{place[0].upper() + place[1:]}: {item.effect.name.replace('_', ' ')}, {course}: {numbers}.",
+    )
+
+
+def _unexplained(problem: Problem, rest: Adequacy, tones: list[ForeignTone], options: DiagnoseOptions) -> Unexplained | None:
+    level = LEVEL_REST * options.level
+    if problem.fit.window is None:
+        return None
+    if rest.p_value > level and not tones:
+        return None
+    structures = [s for s in rest.structures if s.p_value < level]
+    channels = dict.fromkeys([s.channel for s in structures])
+    channels |= dict.fromkeys(c for c, p in rest.channel_p.items() if p < level / (10 * len(rest.channel_p)))
+    channels |= dict.fromkeys(t.channel for t in tones)
+    depends = list(dict.fromkeys(s.variable for s in structures if s.variable != "time"))[:4]
+    depends += [f"frequency:{t.frequency_hz:.4g}Hz" for t in tones[:2]]
+    p = min([rest.p_value] + [t.p_value for t in tones])
+    what = f"depends on {', '.join(depends)}" if depends else "has no dependence on a single state"
+    if tones:
+        what += f"; a tone at {tones[0].frequency_hz:.4g} Hz that is no harmonic of the period stands in {tones[0].channel}"
+    sentence = f"Something that the catalogue does not name is left in {', '.join(channels)}: it {what} (p = {p:.1e})."
+    return Unexplained(tuple(channels), tuple(depends), max(p, 1e-300), sentence)
+
+
+def _verdict(findings: tuple[Finding, ...], unexplained: Unexplained | None, fit: Fit) -> str:
+    if unexplained is not None:
+        return "partly_explained" if findings else "unexplained"
+    return "explained" if findings else "consistent"
+
+
+def _training(problem: Problem, augmented: Augmented) -> ChannelFit:
+    """RMS of the averaged residual before and after, in N.m and N."""
+    fit = problem.fit
+    before = fit.residual_rms
+    after, noise = {}, {}
+    levels = fit.noise_std
+    change = _explained(problem, augmented)
+    for block, series in zip(problem.blocks, change, strict=True):
+        rest = residual(block, fit.solution.theta, fit.solution.scale) - series
+        for k, (channel, joint) in enumerate(zip(block.channels, block.joint, strict=True)):
+            factor = abs(1.0 / augmented.scale[joint]) if joint >= 0 else 1.0
+            used = block.usable[k]
+            after[channel] = float(np.sqrt(np.mean(rest[k][used] ** 2)) * factor) if used.any() else 0.0
+            noise[channel] = levels[channel] / np.sqrt(block.repeats)
+    return ChannelFit(before, after, noise)
+
+
+def _explained(problem: Problem, augmented: Augmented) -> list[FloatArray]:
+    """What baseline change and effects add to the prediction of every block, measurement units, (c, B)."""
+    fit, count = problem.fit, len(problem.fit.model.parameters)
+    d_theta = augmented.theta - np.where(fit.solution.identifiable[:count], fit.solution.theta, augmented.theta)
+    result = []
+    for index, block in enumerate(problem.blocks):
+        factors = np.where(block.joint >= 0, fit.solution.scale[np.maximum(block.joint, 0)], 1.0)
+        total = factors[:, None] * np.tensordot(block.columns, d_theta, axes=([1], [0]))
+        base = np.tensordot(block.columns, fit.solution.theta, axes=([1], [0])) + block.known
+        change = np.where(block.joint >= 0, (augmented.scale - fit.solution.scale)[np.maximum(block.joint, 0)], 0.0)
+        total += change[:, None] * base
+        for item in augmented.additions:
+            columns = problem.enter(index, item.effect.columns(problem.scenes[index], item.place, item.shape))
+            total += np.tensordot(columns, item.values, axes=([1], [0]))
+        result.append(total)
+    return result
+
