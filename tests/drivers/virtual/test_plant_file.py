@@ -1,3 +1,4 @@
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ from drivers.virtual.errors import PlantError
 from drivers.virtual.from_robot import plant_from_robot_file, plant_from_urdf
 from drivers.virtual.plant_file import PRESETS, JointPlant, load_plant, preset_names
 from drivers.virtual.record import record_virtual
+from drivers.virtual.robot_description import robot_attachments
 from drivers.virtual.trajectories import random_fourier
 
 SHARED = Path(__file__).resolve().parents[4] / "shared/data"
@@ -106,3 +108,15 @@ def test_prismatic_joints_carry_weight_along_their_axis():
     still = np.zeros((1, 1))
     loads = RigidPlant(plant_from_urdf("lift", urdf)).inverse(still, still, still + 1.0)
     assert loads.joint_nm[0, 0] == pytest.approx(2.0 * 10.81)
+
+
+def test_the_robot_file_of_a_plant_keeps_its_secrets():
+    plant = plant_from_urdf("pendulum", PENDULUM)
+    files = robot_attachments(plant)
+    table = tomllib.loads(files["robot.toml"].decode())
+    assert table["joint"][0]["name"] == "hinge"
+    assert b"inertial" not in files[table["urdf"]]
+    arm = tomllib.loads(robot_attachments(load_plant("six_axis"))["robot.toml"].decode())
+    assert [joint["gear_ratio"] for joint in arm["joint"]][:2] == [121.0, 140.0]
+    assert arm["joint"][1]["gravity_compensation"] == {"harmonics": 3}
+    assert "coulomb_nm" not in arm["joint"][0]
