@@ -105,9 +105,16 @@ class Scene:
 
     @cached_property
     def load(self) -> FloatArray:
-        """Torque that the gears carry: bodies, gravity and compensation, without friction, offset, rotor; (n, B)."""
+        """Torque that the gears carry: bodies, gravity and compensation, without friction and rotor; (n, B).
+
+        The offset counts as friction's, but over a limited travel it cannot be told from the constant part of a
+        Fourier compensation: large amounts of both cancel. There the two stay together.
+        """
         groups = ("inertial", "gravity_compensation")
-        keep = np.array([p.group in groups for p in self.model.parameters])
+        compensated = [j.name for j in self.robot.joints if j.drive.gravity_harmonics > 0]
+        keep = np.array(
+            [p.group in groups or (p.group == "offset" and p.joint in compensated) for p in self.model.parameters]
+        )
         rows = self.model.drive_rows(self.q, self.qd, self.qdd)
         return np.tensordot(rows.columns[:, keep], self.theta[keep], axes=([1], [0]))
 

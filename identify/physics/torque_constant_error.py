@@ -15,7 +15,7 @@ def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArr
 
 
 def _places(scene: Scene) -> list[Place]:
-    """Joints whose constant the fit took as exact, so that their scale is 1; others show in their estimate."""
+    """Joints whose constant the fit took as exact (scale 1); the others show in their estimate."""
     return [place for place in every_drive(scene) if scene.scale[place.joint] == 1.0]
 
 
@@ -31,7 +31,7 @@ EFFECT = Effect(
         "constant is lower by about that share."
     ),
     reference=(
-        "Gautier & Briot, JDSMC 136(5) 2014: one joint's torque rows times 1 + e = K_nominal / K, K > 0"
+        "Gautier & Briot, JDSMC 136(5) 2014: one torque row times 1 + e = K_nominal / K"
     ),
     constraint=lambda scene, place, values, shape: bool(1.0 + values[0] > 0.0),
 )
