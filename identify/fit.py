@@ -220,7 +220,7 @@ def _fit_periodic(
         solution, trajectory, rows = maximise_likelihood(model, data, window, trajectory, noises, free, start)
     else:
         solution = solve(rows.blocks, noises, model.robot.n, free, start)
-    warnings += drift_warnings(tables, rows.blocks, noises)
+    warnings += drift_warnings(tables, rows.blocks)
     warnings += motion_warnings(model.robot, *trajectory.evaluate(window.start_s + np.linspace(0, window.period_s, 400)))
     result = Fit(
         model, data, window, trajectory, None, rows, noises, solution, np.empty(0), (),

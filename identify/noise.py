@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_toeplitz
 
 from identify.rotations import FloatArray
 
@@ -85,16 +84,23 @@ def circular_filter(taps: FloatArray, series: FloatArray) -> FloatArray:
 
 
 def _levinson_orders(autocovariance: FloatArray, count: int) -> FloatArray:
-    """Fit autoregressions of all orders and return the taps of the order that BIC prefers."""
-    best_taps, best_score = np.array([1.0]), count * np.log(autocovariance[0])
+    """Fit autoregressions of all orders and return the taps of the order that BIC prefers.
+
+    Source:
+        Levinson's recursion: every order from the one before.
+    """
+    taps, variance = np.array([1.0]), float(autocovariance[0])
+    best_taps, best_score = taps, count * np.log(variance)
     for order in range(1, len(autocovariance)):
-        a = solve_toeplitz(autocovariance[:order], -autocovariance[1 : order + 1])
-        variance = autocovariance[0] + a @ autocovariance[1 : order + 1]
+        reflection = -float(taps @ autocovariance[order:0:-1]) / variance
+        longer = np.append(taps, 0.0)
+        taps = longer + reflection * longer[::-1]
+        variance *= 1.0 - reflection**2
         if variance <= 0:
             break
         score = count * np.log(variance) + order * np.log(count)
         if score < best_score:
-            best_taps, best_score = np.concatenate([[1.0], a]), score
+            best_taps, best_score = taps, score
     return best_taps
 
 

@@ -92,6 +92,27 @@ def _persistent(above: FloatArray) -> FloatArray:
     return above & ((padded[:, :-2] + padded[:, 2:]) > 0)
 
 
+def differentiate(series: FloatArray, rate_hz: float) -> FloatArray:
+    """Differentiate a uniform series (n, N) by central differences of sixth order.
+
+    The plain ones lose (w dt)^2 / 6 of a line: half a per cent of an acceleration at 3 Hz and 150 Hz.
+
+    Args:
+        series: samples, shape (n, N).
+        rate_hz: sampling rate.
+
+    Returns:
+        Derivatives, shape (n, N); of second order for the three samples at either end.
+    """
+    result = np.gradient(series, 1.0 / rate_hz, axis=1)
+    total = np.zeros_like(series[:, 3:-3])
+    for reach, weight in ((1, 45.0), (2, -9.0), (3, 1.0)):
+        ahead = series[:, 3 + reach : series.shape[1] - 3 + reach]
+        total += weight * (ahead - series[:, 3 - reach : series.shape[1] - 3 - reach])
+    result[:, 3:-3] = total * rate_hz / 60.0
+    return result
+
+
 def smooth(position: Signal, bandwidth_hz: float | None = None) -> SmoothMotion:
     """Differentiate a non-periodic motion.
 
@@ -123,8 +144,8 @@ def smooth(position: Signal, bandwidth_hz: float | None = None) -> SmoothMotion:
     rest = (uniform - q)[:, 10:-10]
     passed = cutoff / (0.5 * rate)
     noise = np.sqrt(np.mean(rest**2, axis=1) / max(1.0 - passed, 0.1))
-    qd = np.gradient(q, 1.0 / rate, axis=1)
-    qdd = np.gradient(qd, 1.0 / rate, axis=1)
+    qd = differentiate(q, rate)
+    qdd = differentiate(qd, rate)
     return SmoothMotion(grid, q, qd, qdd, cutoff, noise, _valid(position.t_s, grid, rate, cutoff))
 
 

@@ -7,7 +7,7 @@ from scipy import stats
 
 from identify.blocks import Block
 from identify.model import Model
-from identify.noise import NoiseModel
+from identify.noise import noise_from_scatter
 from identify.robot import Robot
 from identify.rotations import FloatArray
 from identify.solve import Solution
@@ -19,28 +19,29 @@ _WEAK = 0.5  # relative std beyond which an estimate says little
 
 
 def drift_warnings(
-    tables: list[tuple[FloatArray, float]], blocks: tuple[Block, ...], noises: list[NoiseModel]
+    tables: list[tuple[FloatArray, float]], blocks: tuple[Block, ...]
 ) -> list[str]:
     """Test whether the channels' means change from period to period more than their noise allows.
 
     Args:
         tables: scatter between the periods of every block.
         blocks: the blocks, for names.
-        noises: their noise.
 
     Returns:
         One sentence a channel that drifts.
     """
     result = []
     channels = sum(len(block.channels) for block in blocks)
-    for (table, _), block, noise in zip(tables, blocks, noises, strict=True):
+    for (table, dof), block in zip(tables, blocks, strict=True):
         means = table.mean(axis=2)
         periods, count = table.shape[1:]
         if periods < 3:
             continue
         ramp = np.arange(periods) - (periods - 1) / 2.0
         slope = means @ ramp / (ramp @ ramp)
-        std = np.sqrt(noise.spectrum_at_zero() / count / (ramp @ ramp))
+        # the drift itself must not pass for slow noise: judge it by what happens within the periods
+        within = noise_from_scatter(table - means[:, :, None], dof).spectrum_at_zero()
+        std = np.sqrt(within / count / (ramp @ ramp))
         p = 2.0 * stats.norm.sf(np.abs(slope) / np.maximum(std, 1e-300))
         for k in np.flatnonzero(p * channels < _ALARM):
             result.append(
