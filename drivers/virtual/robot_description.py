@@ -1,4 +1,4 @@
-"""The robot file that belongs to a plant: what its user may know, nothing of its true inertials or friction."""
+"""The robot file of a plant: what its user may know, nothing of its true inertials or friction."""
 
 from __future__ import annotations
 
