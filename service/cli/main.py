@@ -2,100 +2,107 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import sys
 from collections.abc import Mapping
-
-import click
-import typer
-from typer.main import get_command
+from importlib.metadata import version
 
 # command -> (module, first line of its help); modules are imported only when their command is used
 COMMANDS: Mapping[str, tuple[str, str]] = {
     "demo": ("demo", "The whole story on the virtual robot, no hardware needed."),
     "inspect": ("inspect", "What is in a log, and whether it is fit for use."),
     "identify": ("identify", "Parameters, torque constants and covariance from a log."),
+    "diagnose": ("diagnose", "The physics a model lacks: where, which, how much, and the proof."),
     "export": ("export", "An estimate as URDF and MJCF."),
     "import": ("import_", "A foreign recording (csv, npz, db3, mcap) as a log."),
     "recover": ("recover", "A broken log's intact part as a valid log."),
 }
+_INTERRUPTED = 130  # what shells report for Ctrl-C
 
 
-class LazyGroup(click.Group):
-    """Loads a command's module when the command is called, so that --help is quick."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Name the commands in the order of the table."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import the module of one command and wrap its function."""
-        if cmd_name not in COMMANDS:
-            return None
-        module_name = COMMANDS[cmd_name][0]
-        module = importlib.import_module(f"service.cli.{module_name}")
-        app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        app.command(name=cmd_name)(getattr(module, module_name))
-        return get_command(app)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, help_text) for name, (_, help_text) in COMMANDS.items()])
-
-
-def _root() -> LazyGroup:
-    return LazyGroup(
-        "residuum",
-        help="Record robots, identify their dynamics with uncertainty, find the physics a simulation left out.",
-        epilog="Example: residuum identify run.mcap --robot ir361 -o estimate.json",
-        no_args_is_help=True,
-    )
-
-
-def main(arguments: list[str] | None = None) -> None:
+def main() -> None:
     """Run the command line and exit: 0 success, 2 wrong use, 3 hardware, 4 unusable data, 1 anything else."""
-    sys.exit(run(arguments))
+    sys.exit(run(sys.argv[1:]))
 
 
-def run(arguments: list[str] | None = None) -> int:
+def run(arguments: list[str]) -> int:
     """Run one command.
 
     Args:
-        arguments: words after the program's name; the process's own when not given.
+        arguments: words after the program's name.
 
     Returns:
         The exit code.
     """
-    try:
-        result = _root().main(arguments, prog_name="residuum", standalone_mode=False)
-        return result if isinstance(result, int) else 0
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message())
+    if not arguments or arguments[0] in ("--help", "-h"):
+        print(_help())
         return 0
-    except click.ClickException as error:
-        return _complain(error.format_message(), 2)
-    except click.exceptions.Exit as error:
-        return int(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
-        return _complain("Interrupted; nothing was half-written.", 130)
+    if arguments[0] == "--version":
+        print(f"residuum {version('residuum')}")
+        return 0
+    name = arguments[0]
+    if name not in COMMANDS:
+        near = difflib.get_close_matches(name, COMMANDS, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else "see residuum --help."
+        return _complain(f"There is no command '{name}'; {hint}", 2)
+    try:
+        return _call(name, arguments[1:])
+    except (KeyboardInterrupt, EOFError):
+        return _complain("Interrupted; nothing was half-written.", _INTERRUPTED)
     except BrokenPipeError:
+        sys.stderr.close()  # the reader has gone: nobody is left to tell
         return 1
     except Exception as error:  # the operator gets a sentence, never a traceback
         return _complain(*_explain(error))
 
 
+def _call(name: str, arguments: list[str]) -> int:
+    import typer
+
+    module_name = COMMANDS[name][0]
+    module = importlib.import_module(f"service.cli.{module_name}")
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command(name=name)(getattr(module, module_name))
+    try:
+        result = app(arguments, prog_name=f"residuum {name}", standalone_mode=False)
+    except typer.Exit as leaving:
+        return int(leaving.exit_code)
+    except typer.Abort:
+        return _complain("Interrupted; nothing was half-written.", _INTERRUPTED)
+    return result if isinstance(result, int) else 0
+
+
+def _help() -> str:
+    width = max(len(name) for name in COMMANDS) + 2
+    lines = [
+        "Usage: residuum COMMAND [OPTIONS]",
+        "",
+        "Record robots, identify their dynamics with uncertainty, find the physics a simulation left out.",
+        "",
+        "Commands:",
+        *(f"  {name:<{width}}{text}" for name, (_, text) in COMMANDS.items()),
+        "",
+        "Each command has --help and --json.",
+        "Example: residuum identify run.mcap --robot ir361 -o estimate.json",
+    ]
+    return "\n".join(lines)
+
+
 def _explain(error: Exception) -> tuple[str, int]:
     code = getattr(error, "exit_code", None)
     if isinstance(code, int):
-        return str(error), code
+        formatted = getattr(error, "format_message", None)  # the command-line parser's own complaints
+        return (formatted() if formatted else str(error)), (2 if formatted else code)
     if isinstance(error, OSError):
-        return f"{error.filename or 'A file'}: {error.strerror or error}; check the path, its permissions and the free space.", 2
+        name, reason = error.filename or "A file", error.strerror or str(error)
+        return f"{name}: {reason}; check the path, its permissions and the free space.", 2
     if isinstance(error, MemoryError):
         return "Not enough memory for this recording; identify a shorter part of it.", 1
-    return f"Unexpected {type(error).__name__}: {error}; this is a fault of residuum, please report it with the command.", 1
+    kind = type(error).__name__
+    return f"Unexpected {kind}: {error}; this is a fault of residuum, please report it with the command.", 1
 
 
 def _complain(sentence: str, code: int) -> int:
-    click.echo("Error: " + " ".join(sentence.split()), err=True)
+    print("Error: " + " ".join(sentence.split()), file=sys.stderr)
     return code
