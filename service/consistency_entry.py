@@ -64,6 +64,6 @@ def _statement(found: Consistency) -> str:
         return "The estimate is physically consistent as it is: the projection changes nothing."
     return (
         "The projected parameters are the physically consistent ones nearest to the estimate in the metric "
-        f"of its covariance, {found.distance:.3g} std away; 'shift' is in std of each parameter. They are not "
-        "what the data say best, and the covariance given is that of the estimate, not of the projection."
+        f"of its covariance, {found.distance:.3g} std away; 'shift' is in std of each parameter. They are not"
+        " what the data say best, and the covariance given is that of the estimate, not of the projection."
     )

@@ -2,7 +2,8 @@
 
     ServiceError         what the operator asked for cannot be done
     ├── UsageError       wrong use: a path, a name, an option
-    └── LogError         a log that cannot serve the purpose
+    ├── LogError         a log that cannot serve the purpose
+    └── EstimateError    an estimate that cannot serve the purpose
 """
 
 from __future__ import annotations
@@ -22,5 +23,11 @@ class UsageError(ServiceError):
 
 class LogError(ServiceError):
     """A recording does not fit the robot or the purpose."""
+
+    exit_code = 4
+
+
+class EstimateError(ServiceError):
+    """An estimate is not physically possible, or its files would not say what it says."""
 
     exit_code = 4
