@@ -32,6 +32,7 @@ from drivers.errors import (
 )
 
 _INTERPOLATE = 1 << 4  # control word bit 4 starts interpolation in mode 7
+_LARGEST_COUNT = 2**31 - 1
 _LARGEST_LOAD = 0.8  # of the wire, worst-case stuffing; SDO, heartbeats and retries need the rest
 
 
@@ -142,14 +143,13 @@ class DriveBus:
             targets_rad: set point of each axis [rad, joint side], reached one period later.
 
         Raises:
+            ConfigError: a set point is not a number or beyond the drive's counts; nothing was sent.
             DriveStoppedError: there was a cause to stop; the ladder has stopped the drives, `report` tells.
         """
         if self.phase is not Phase.RUNNING:
             self._refuse_cycle()
+        self._targets = self._counts(targets_rad)
         self._ledger.cycle += 1
-        self._targets = [
-            axis.units.counts(target) for axis, target in zip(self._axes, targets_rad, strict=True)
-        ]
         try:
             sample = self._exchange.step(self._ledger.cycle, self._words, self._targets)
         except LinkError as error:
@@ -227,6 +227,19 @@ class DriveBus:
                 self.stop(f"The session was left by {kind.__name__ if kind else 'an error'}.")
         finally:
             self.close()
+
+    def _counts(self, targets_rad: Sequence[float]) -> list[int]:
+        if len(targets_rad) != len(self._axes):
+            raise ConfigError(f"{len(self._axes)} set points are needed for a cycle, {len(targets_rad)} came.")
+        counts = []
+        for axis, target_rad in zip(self._axes, targets_rad, strict=True):
+            if not abs(target_rad) < _LARGEST_COUNT * abs(axis.units.rad_per_count):
+                raise ConfigError(
+                    f"The set point {target_rad} rad of {axis.name} cannot be sent: its drive counts 32 bits; "
+                    "check the trajectory."
+                )
+            counts.append(axis.units.counts(target_rad))
+        return counts
 
     def _lead(self, deadline_ns: int) -> CycleSample:
         while True:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from drivers.errors import ConfigError
 
 
 class CanConfig(BaseModel):
@@ -74,3 +78,21 @@ class BusConfig(BaseModel):
     def heartbeat_lost_ms(self) -> int:
         """After how many milliseconds without a heartbeat the other side counts as dead."""
         return round(self.heartbeat_ms * self.heartbeat_patience)
+
+
+def load_bus(path: str | Path) -> BusConfig:
+    """Read the configuration of a bus from a TOML file; unknown keys are refused.
+
+    Raises:
+        ConfigError: not readable, or not what a bus configuration holds.
+    """
+    try:
+        return BusConfig.model_validate(tomllib.loads(Path(path).read_text("utf-8")))
+    except OSError as error:
+        raise ConfigError(f"The bus configuration {path} could not be read: {error.strerror}.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"The bus configuration {path} is not TOML: {error}.") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(f"The bus configuration {path} cannot be used: {where}: {first['msg']}.") from None

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from drivers.canopen.config import AxisConfig, BusConfig, CanConfig
+from drivers.canopen.config import AxisConfig, BusConfig, CanConfig, load_bus
 from drivers.canopen.emergency import decode_emergency, emergency_text
 from drivers.canopen.frame import bus_load, error_text, worst_case_bits
 from drivers.canopen.heartbeat import HeartbeatProducer, HeartbeatWatch
@@ -214,6 +214,21 @@ def test_a_bad_profile_is_one_sentence(tmp_path, text, words):
 def test_an_unknown_profile_lists_the_known():
     with pytest.raises(ConfigError, match="generic, interpolated, whole_milliseconds"):
         load_profile("fancy")
+
+
+def test_a_bus_is_read_from_toml(tmp_path):
+    path = tmp_path / "bus.toml"
+    path.write_text(
+        'rate_hz = 200\n[can]\ninterface = "slcan"\nchannel = "/dev/ttyACM0"\nown_echo = false\n'
+        '[[axes]]\nname = "joint_1"\nnode = 3\ngear_ratio = 94.1\ndirection = -1\n'
+    )
+    config = load_bus(path)
+    assert (config.rate_hz, config.can.interface, config.axes[0].direction) == (200.0, "slcan", -1)
+    path.write_text(path.read_text() + "wheel = 3\n")
+    with pytest.raises(ConfigError, match=r"bus\.toml cannot be used: axes\.0\.wheel: Extra inputs"):
+        load_bus(path)
+    with pytest.raises(ConfigError, match="could not be read"):
+        load_bus(tmp_path / "none.toml")
 
 
 def test_node_numbers_and_names_are_distinct():

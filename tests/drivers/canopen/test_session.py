@@ -209,6 +209,17 @@ def test_calls_out_of_order_are_refused():
     assert bus.close().outcome == "failed"  # nothing was run
 
 
+@pytest.mark.parametrize("targets", [[0.0, float("nan")], [0.0, 1e9], [0.0]])
+def test_a_set_point_that_cannot_be_sent_is_refused_and_the_drives_stop(targets):
+    bus, fleet, _ = simulated(2)
+    with pytest.raises(ConfigError, match="set point"), bus:
+        ready(bus, fleet)
+        bus.cycle([0.0, 0.0])
+        bus.cycle(targets)
+    assert fleet.stopped
+    assert bus.report().cycles == 1
+
+
 def test_inverted_drive_and_joint_read_in_joint_sense():
     plates = [DriveData(node=1), DriveData(node=2, polarity=0xC0)]
     plant = InertiaPlant([InertiaAxis(start_rad=0.1) for _ in plates])
