@@ -62,7 +62,9 @@ class Moves:
         return first + step * share, step * rate, step * slope
 
 
-def _profile(t_s: FloatArray, duration_s: FloatArray, blend_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _profile(
+    t_s: FloatArray, duration_s: FloatArray, blend_s: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Share of the way (0 to 1), its rate [1/s] and acceleration [1/s2]."""
     t = np.clip(t_s, 0.0, duration_s)
     late = t > 0.5 * duration_s
@@ -189,3 +191,22 @@ def constant_speed_sweeps(
             blend.append(speed_up)
             duration.append(span / rate + speed_up)
     return Moves(np.array(points), np.array(duration), np.array(blend), pause_s)
+
+
+def joined(parts: list[Moves], limits: MotionLimits) -> Moves:
+    """String moves together, going from the end of each to the beginning of the next.
+
+    Args:
+        parts: with the same pause.
+        limits: for the moves in between.
+
+    Returns:
+        One sequence.
+    """
+    points, duration, blend = [parts[0].points], [parts[0].duration_s], [parts[0].blend_s]
+    for part in parts[1:]:
+        time = quickest_move(limits, part.points[0] - points[-1][-1])
+        points.append(part.points)
+        duration += [np.array([time[0]]), part.duration_s]
+        blend += [np.array([time[1]]), part.blend_s]
+    return Moves(np.vstack(points), np.concatenate(duration), np.concatenate(blend), parts[0].pause_s)

@@ -13,7 +13,13 @@ from identify.excitation.discriminate import Discriminating
 from identify.excitation.errors import DesignError
 from identify.excitation.expected import Expected, expected_quality, plain_series, variances_of
 from identify.excitation.feasibility import torque_violation, workspace_violation
-from identify.excitation.information import InformationModel, NamedEffect, NoiseLevels, information_model, noise_levels
+from identify.excitation.information import (
+    InformationModel,
+    NamedEffect,
+    NoiseLevels,
+    information_model,
+    noise_levels,
+)
 from identify.excitation.limits import MotionLimits, motion_limits
 from identify.excitation.mapping import ShapeMapping, unit_waves
 from identify.excitation.objective import Problem
@@ -27,10 +33,11 @@ from identify.excitation.search import Progress, feasible_series, search
 from identify.excitation.series import FourierSeries
 from identify.excitation.verify import Peaks, ramp_torques, verify
 from identify.excitation.workspace import Workspace, check_workspace
-from identify.model import build_model
+from identify.model import Model, build_model
 from identify.robot import Robot
 
 _GRID_PER_LINE = 16  # information grid points a line and period: finer changes log det by less than 0.01
+_FINE_PER_LINE = 40  # with effects: what happens near standstill needs more instants
 _DECIMALS = 10
 _MOST_HARMONICS = 50
 
@@ -50,7 +57,7 @@ class DesignOptions:
         refined: number of them that are optimised to the end.
         share: part of the joints' limits that may be used.
         workspace: obstacles.
-        effects: for the discriminating criterion.
+        effects: for the discriminating criterion; ``NAME:PLACE`` of the catalogue, or columns of one's own.
         noise: std per channel; what is missing is assumed.
         noise_source: where ``noise`` comes from.
         reference: parameter values by name of an earlier estimate; None takes the URDF or a guess.
@@ -69,7 +76,7 @@ class DesignOptions:
     refined: int = 2
     share: float = 0.99
     workspace: Workspace = field(default_factory=Workspace)
-    effects: tuple[NamedEffect, ...] = ()
+    effects: tuple[str | NamedEffect, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     noise_source: str = "the robot file"
     reference: Mapping[str, float] | None = None
@@ -125,7 +132,11 @@ def _check_options(robot: Robot, options: DesignOptions) -> None:
     for name, value in (("fundamental", options.fundamental_hz), ("rate", options.rate_hz)):
         if not (np.isfinite(value) and value > 0.0):
             raise DesignError(f"The {name} is {value:g} Hz; give a positive frequency.")
-    for name, number in (("starts", options.starts), ("refined starts", options.refined), ("periods", options.periods)):
+    for name, number in (
+        ("starts", options.starts),
+        ("refined starts", options.refined),
+        ("periods", options.periods),
+    ):
         if number < 1:
             raise DesignError(f"The number of {name} is {number}; give at least 1.")
     samples = options.rate_hz / options.fundamental_hz
@@ -149,7 +160,9 @@ def _check_start(robot: Robot, limits: MotionLimits, pose: tuple[float, ...] | N
     if pose is None:
         return
     if len(pose) != robot.n:
-        raise DesignError(f"The start pose has {len(pose)} positions, but robot '{robot.name}' has {robot.n} joints.")
+        raise DesignError(
+            f"The start pose has {len(pose)} positions, but robot '{robot.name}' has {robot.n} joints."
+        )
     for joint, position in zip(robot.joints, pose, strict=True):
         if not joint.limits.lower <= position <= joint.limits.upper:
             raise DesignError(
@@ -158,7 +171,9 @@ def _check_start(robot: Robot, limits: MotionLimits, pose: tuple[float, ...] | N
             )
 
 
-def _criterion(options: DesignOptions, information: InformationModel, problem: Problem, plain: FourierSeries) -> Criterion:
+def _criterion(
+    options: DesignOptions, information: InformationModel, problem: Problem, plain: FourierSeries
+) -> Criterion:
     if options.criterion == "a":
         return AOptimal(variances_of(problem, plain))
     if options.criterion == "condition":
@@ -166,6 +181,21 @@ def _criterion(options: DesignOptions, information: InformationModel, problem: P
     if options.criterion == "discriminating":
         return Discriminating(information.baseline, information.effect_columns)
     return DOptimal()
+
+
+def _effects(model: Model, reference: ReferenceModel, options: DesignOptions) -> tuple[NamedEffect, ...]:
+    if options.criterion != "discriminating":
+        return ()
+    from identify.excitation.physics_effects import (
+        catalogue_effect,
+    )  # the catalogue is large: loaded when asked for
+
+    return tuple(
+        effect
+        if isinstance(effect, NamedEffect)
+        else catalogue_effect(model, reference, 1.0 / options.fundamental_hz, effect)
+        for effect in options.effects
+    )
 
 
 def prepare(robot: Robot, options: DesignOptions) -> Problem:
@@ -191,9 +221,9 @@ def prepare(robot: Robot, options: DesignOptions) -> Problem:
     else:
         reference = reference_from_estimate(model, options.reference, options.reference_source)
     noise = noise_levels(model, options.noise, options.noise_source)
-    effects = options.effects if options.criterion == "discriminating" else ()
+    effects = _effects(model, reference, options)
     information = information_model(model, noise, reference, limits, effects)
-    grid = max(_GRID_PER_LINE * options.harmonics, 64)
+    grid = max((_FINE_PER_LINE if effects else _GRID_PER_LINE) * options.harmonics, 64)
     waves = unit_waves(options.fundamental_hz, options.harmonics, grid)
     mapping = ShapeMapping(limits, options.fundamental_hz, options.harmonics, waves)
     samples = options.periods * options.rate_hz / options.fundamental_hz
@@ -284,7 +314,11 @@ def _why_infeasible(problem: Problem, series: FourierSeries) -> str:
     still = series.shrunk(0.0)
     torque = torque_violation(problem.information, problem.mapping.limits, still)
     touching = workspace_violation(problem.information.model.robot, problem.workspace, still)
-    what = torque or touching or torque_violation(problem.information, problem.mapping.limits, series.shrunk(0.02))
+    what = (
+        torque
+        or touching
+        or torque_violation(problem.information, problem.mapping.limits, series.shrunk(0.02))
+    )
     return (
         f"No motion of robot '{problem.information.model.robot.name}' is feasible: even at rest {what}; "
         "loosen that limit, or correct the reference model or the workspace."

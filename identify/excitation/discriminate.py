@@ -35,7 +35,11 @@ class Discriminating:
 
     def __call__(self, information: FloatArray) -> tuple[float, FloatArray]:
         base = np.arange(self.baseline)
-        pairs = [(self.effects[0], np.arange(0))] if len(self.effects) == 1 else list(permutations(self.effects, 2))
+        pairs = (
+            [(self.effects[0], np.arange(0))]
+            if len(self.effects) == 1
+            else list(permutations(self.effects, 2))
+        )
         values, gradients = [], []
         for effect, rival in pairs:
             value, gradient = self._distance(information, np.concatenate([base, rival]), effect)
@@ -59,7 +63,9 @@ class Discriminating:
         return value / len(effect), gradient / len(effect)
 
 
-def smallest_detectable(information: FloatArray, baseline: int, effects: tuple[FloatArray, ...]) -> list[float]:
+def smallest_detectable(
+    information: FloatArray, baseline: int, effects: tuple[FloatArray, ...]
+) -> list[float]:
     """Smallest size of each effect that would be seen, at 1 % false alarms and 90 % power.
 
     Args:

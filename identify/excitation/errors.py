@@ -1,7 +1,7 @@
 """Why an excitation cannot be designed.
 
-    IdentifyError
-    └── DesignError      limits, constraints or options leave no trajectory (wrong use)
+IdentifyError
+└── DesignError      limits, constraints or options leave no trajectory (wrong use)
 """
 
 from __future__ import annotations

@@ -33,10 +33,14 @@ class Violation:
     unit: str
 
     def __str__(self) -> str:
-        return f"{self.what} reaches {self.value:.4g} {self.unit}, but {self.limit:.4g} {self.unit} is the limit"
+        return (
+            f"{self.what} reaches {self.value:.4g} {self.unit}, but {self.limit:.4g} {self.unit} is the limit"
+        )
 
 
-def point_bounds(robot: Robot, speed: FloatArray, acceleration: FloatArray, reach_m: FloatArray) -> FloatArray:
+def point_bounds(
+    robot: Robot, speed: FloatArray, acceleration: FloatArray, reach_m: FloatArray
+) -> FloatArray:
     """Bound the acceleration of any point within ``reach_m`` of each link's joint frame.
 
     Args:
@@ -81,7 +85,9 @@ def coulomb_levels(information: InformationModel) -> FloatArray:
     return np.array([abs(values.get(f"{joint.name}.coulomb", 0.0)) for joint in model.robot.joints])
 
 
-def torque_violation(information: InformationModel, limits: MotionLimits, series: FourierSeries) -> Violation | None:
+def torque_violation(
+    information: InformationModel, limits: MotionLimits, series: FourierSeries
+) -> Violation | None:
     """Name the drive whose torque exceeds its limit most, None if none does."""
     if not np.isfinite(limits.effort).any():
         return None
@@ -91,11 +97,16 @@ def torque_violation(information: InformationModel, limits: MotionLimits, series
         return None
     joint = information.model.robot.joints[worst]
     return Violation(
-        f"the torque of joint '{joint.name}'", float(peaks[worst]), float(limits.effort[worst]), joint.torque_unit
+        f"the torque of joint '{joint.name}'",
+        float(peaks[worst]),
+        float(limits.effort[worst]),
+        joint.torque_unit,
     )
 
 
-def least_clearances(robot: Robot, workspace: Workspace, series: FourierSeries) -> tuple[tuple[str, ...], FloatArray]:
+def least_clearances(
+    robot: Robot, workspace: Workspace, series: FourierSeries
+) -> tuple[tuple[str, ...], FloatArray]:
     """Bound every distance from below over the whole period.
 
     Args:
@@ -117,7 +128,9 @@ def least_clearances(robot: Robot, workspace: Workspace, series: FourierSeries) 
     found = clearances(robot, workspace, q)
     chord = np.linalg.norm(found.moving_m - np.roll(found.moving_m, -1, axis=2), axis=1)
     between = 0.5 * (found.distance_m + np.roll(found.distance_m, -1, axis=1) - chord)
-    return found.names, between.min(axis=1) - step**2 / 8.0 * _greatest_acceleration(robot, workspace, qd, qdd)
+    return found.names, between.min(axis=1) - step**2 / 8.0 * _greatest_acceleration(
+        robot, workspace, qd, qdd
+    )
 
 
 def _greatest_acceleration(robot: Robot, workspace: Workspace, qd: FloatArray, qdd: FloatArray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from identify.rotations import FloatArray
 WRENCH_NOISE = {
     "force.x": 10.54, "force.y": 10.88, "force.z": 4.81, "torque.x": 11.61, "torque.y": 11.33, "torque.z": 3.15,
 }  # fmt: skip
-_JOINT_NOISE_SHARE = 0.005  # of the effort limit: 3.55 of 600, 4.03 of 900, 1.26 of 300 N.m on the published arm
+_JOINT_NOISE_SHARE = (
+    0.005  # of the effort limit: 3.55 of 600, 4.03 of 900, 1.26 of 300 N.m on the published arm
+)
 _STEP = 1e-6  # of the forward differences: rounding and curvature both cost about 1e-8 of a column
 _RICH, _SEED = 200, 7
 # speed below which the search smooths Coulomb's sign, as a share of a typical speed
@@ -34,7 +36,8 @@ class NamedEffect:
 
     Attributes:
         name: as in the catalogue, with its place, such as ``stribeck_friction:joint_2``.
-        columns: (q, qd, qdd), each (n, N), to its columns (channels, k, N) in the channels' units.
+        columns: (q, qd, qdd) on an even grid of one period, each (n, N), to its columns (channels, k, N) in the
+            channels' units.
     """
 
     name: str
@@ -72,10 +75,14 @@ def noise_levels(model: Model, given: Mapping[str, float], where: str = "the rob
     for joint in model.robot.joints:
         effort = joint.limits.effort
         guessed[joint.name] = _JOINT_NOISE_SHARE * effort if np.isfinite(effort) and effort > 0 else 1.0
-    std = np.array([given.get(channel, (guessed | WRENCH_NOISE).get(channel, 1.0)) for channel in model.channels])
+    std = np.array(
+        [given.get(channel, (guessed | WRENCH_NOISE).get(channel, 1.0)) for channel in model.channels]
+    )
     for channel, level in zip(model.channels, std, strict=True):
         if not (np.isfinite(level) and level > 0.0):
-            raise DesignError(f"The noise of channel '{channel}' in {where} is {level:g}; give a positive std per sample.")
+            raise DesignError(
+                f"The noise of channel '{channel}' in {where} is {level:g}; give a positive std per sample."
+            )
     count = sum(channel in given for channel in model.channels)
     if count == len(std):
         return NoiseLevels(std, f"All {count} levels from {where}.")
@@ -110,10 +117,9 @@ class InformationModel:
         noise: std per channel.
         reference: values to expect.
         free_scales: joints whose torque constant is an unknown, shape (k,).
-        kept: columns that any motion could tell apart, shape (m,); of parameters, then constants, then effects.
-        smooth_speed: speed at which the search smooths Coulomb's sign, shape (n,).
+    X        smooth_speed: speed at which the search smooths Coulomb's sign, shape (n,).
         effects: physics a discriminating design shall reveal.
-        effect_columns: for every effect, its positions among the kept columns.
+        effect_columns: for every effect, its positions behind the kept columns.
     """
 
     model: Model
@@ -129,37 +135,48 @@ class InformationModel:
     def names(self) -> list[str]:
         """Names of the kept columns that are parameters or torque constants."""
         names = self.all_names
-        return [names[k] for k in self.kept if k < len(names)]
+        return [names[k] for k in self.kept]
 
     @property
     def all_names(self) -> list[str]:
         """Names of the parameters, then of the unknown torque constants."""
         joints = self.model.robot.joint_names
-        return [p.name for p in self.model.parameters] + [f"{joints[k]}.torque_constant" for k in self.free_scales]
+        return [p.name for p in self.model.parameters] + [
+            f"{joints[k]}.torque_constant" for k in self.free_scales
+        ]
 
     @property
     def baseline(self) -> int:
-        """Number of kept columns that belong to parameters and torque constants."""
-        return len(self.names)
+        """Number of columns that belong to parameters and torque constants."""
+        return len(self.kept)
 
     def sample(self, q: FloatArray, qd: FloatArray, qdd: FloatArray, smooth: bool = False) -> Sampled:
         """Evaluate whitened columns and torques.
 
         Args:
-            q: positions, shape (n, N).
+            q: positions on an even grid of one period, shape (n, N).
             qd: velocities, shape (n, N).
             qdd: accelerations, shape (n, N).
             smooth: take tanh for Coulomb's sign, as the search does.
 
         Returns:
-            The kept columns and the torques.
+            The kept columns, those of the effects behind them, and the torques.
         """
-        columns, torque = self._all_columns(q, qd, qdd, smooth)
-        return Sampled(columns[:, self.kept], torque)
+        columns, torque = self.baseline_columns(q, qd, qdd, smooth)
+        return Sampled(
+            np.concatenate([columns[:, self.kept], self.whitened_effects(q, qd, qdd)], axis=1), torque
+        )
 
-    def _all_columns(
+    def whitened_effects(self, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """Evaluate the effects' columns over one period, shape (channels, k, N)."""
+        none = np.zeros((len(self.noise.std), 0, q.shape[1]))
+        parts = [effect.columns(q, qd, qdd) for effect in self.effects]
+        return np.concatenate([none, *parts], axis=1) / self.noise.std[:, None, None]
+
+    def baseline_columns(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, smooth: bool
     ) -> tuple[FloatArray, FloatArray]:
+        """Evaluate whitened columns of all parameters and constants, each instant by itself, and the torques."""
         model, theta = self.model, self.reference.theta
         sign = np.tanh(drive_velocity(model.robot, qd) / self.smooth_speed[:, None]) if smooth else None
         drives = model.drive_rows(q, qd, qdd, sign)
@@ -170,13 +187,12 @@ class InformationModel:
         columns = np.concatenate(parts)
         scales = np.zeros((len(columns), len(self.free_scales), q.shape[1]))
         scales[self.free_scales, np.arange(len(self.free_scales))] = torque[self.free_scales]
-        extra = [effect.columns(q, qd, qdd) for effect in self.effects]
-        return np.concatenate([columns, scales, *extra], axis=1) / self.noise.std[:, None, None], torque
+        return np.concatenate([columns, scales], axis=1) / self.noise.std[:, None, None], torque
 
     def differentiate(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray
     ) -> tuple[Sampled, Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]]:
-        """Evaluate smooth columns and the way back from their derivatives to the motion's.
+        """Evaluate smooth baseline columns and the way back from their derivatives to the motion's.
 
         Args:
             q: positions, shape (n, N).
@@ -193,13 +209,17 @@ class InformationModel:
         moved = np.repeat(state[:, None], 3 * n + 1, axis=1)
         moved[np.arange(3 * n), np.arange(1, 3 * n + 1)] += _STEP
         flat = moved.reshape(3 * n, -1)
-        every = self.sample(flat[:n], flat[n : 2 * n], flat[2 * n :], smooth=True)
-        columns = every.columns.reshape(*every.columns.shape[:2], 3 * n + 1, count)
-        torque = every.torque.reshape(n, 3 * n + 1, count)
-        here = Sampled(np.ascontiguousarray(columns[:, :, 0]), torque[:, 0])
+        columns, torque = self.baseline_columns(flat[:n], flat[n : 2 * n], flat[2 * n :], smooth=True)
+        columns = columns[:, self.kept].reshape(len(columns), len(self.kept), 3 * n + 1, count)
+        torque = torque.reshape(n, 3 * n + 1, count)
+        here = Sampled(
+            np.concatenate([columns[:, :, 0], self.whitened_effects(q, qd, qdd)], axis=1), torque[:, 0]
+        )
 
-        def pull_back(columns_bar: FloatArray, torque_bar: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            with_columns = np.einsum("cpn,cpkn->kn", columns_bar, columns)
+        def pull_back(
+            columns_bar: FloatArray, torque_bar: FloatArray
+        ) -> tuple[FloatArray, FloatArray, FloatArray]:
+            with_columns = np.einsum("cpn,cpkn->kn", columns_bar[:, : len(self.kept)], columns)
             with_torque = np.einsum("jn,jkn->kn", torque_bar, torque)
             both = with_columns + with_torque
             slope = (both[1:] - both[0]) / _STEP
@@ -227,37 +247,29 @@ def information_model(
     Returns:
         The information model.
 
-    Raises:
-        DesignError: an effect's columns are swallowed by the baseline whatever the motion.
     """
     speed = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0)
-    has_constant = [k for k, joint in enumerate(model.robot.joints) if joint.drive.torque_constant is not None]
+    has_constant = [
+        k for k, joint in enumerate(model.robot.joints) if joint.drive.torque_constant is not None
+    ]
     free = np.array(has_constant if model.kind == "combined" else [], dtype=int)
-    count = len(model.parameters) + len(free)
-    everything = InformationModel(model, noise, reference, free, np.arange(0), _SMOOTH_SHARE * speed, effects)
+    everything = InformationModel(model, noise, reference, free, np.arange(0), _SMOOTH_SHARE * speed)
     rng = np.random.default_rng(_SEED)
     q = rng.uniform(limits.lower[:, None], limits.upper[:, None], (model.robot.n, _RICH))
     hard = np.where(np.isfinite(limits.acceleration), limits.acceleration, 5.0 * speed)
     qd, qdd = (rng.uniform(-1.0, 1.0, q.shape) * size[:, None] for size in (speed, hard))
-    columns, _ = everything._all_columns(q, qd, qdd, False)
+    columns, _ = everything.baseline_columns(q, qd, qdd, False)
     flat = columns.transpose(0, 2, 1).reshape(-1, columns.shape[1])
     kept = np.sort(independent_columns(flat, np.arange(columns.shape[1])))
-    places = _effect_places(everything, q, qd, qdd, kept, count)
-    return InformationModel(model, noise, reference, free, kept, everything.smooth_speed, effects, places)
+    return replace(
+        everything, kept=kept, effects=effects, effect_columns=_effect_places(effects, q, len(kept))
+    )
 
 
-def _effect_places(
-    model: InformationModel, q: FloatArray, qd: FloatArray, qdd: FloatArray, kept: FloatArray, first: int
-) -> tuple[FloatArray, ...]:
-    places = []
-    for effect in model.effects:
-        width = effect.columns(q[:, :2], qd[:, :2], qdd[:, :2]).shape[1]
-        own = np.flatnonzero((kept >= first) & (kept < first + width))
-        if len(own) < width:
-            raise DesignError(
-                f"Effect '{effect.name}' keeps {len(own)} of its {width} columns beside the model and the effects before "
-                "it, whatever the motion: no excitation can reveal it; leave it out, or measure another channel."
-            )
-        places.append(own)
+def _effect_places(effects: tuple[NamedEffect, ...], q: FloatArray, first: int) -> tuple[FloatArray, ...]:
+    still, places = np.zeros_like(q), []
+    for effect in effects:
+        width = effect.columns(q, still, still).shape[1]
+        places.append(np.arange(first, first + width))
         first += width
     return tuple(places)

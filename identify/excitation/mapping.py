@@ -16,7 +16,9 @@ from identify.excitation.limits import MotionLimits
 from identify.excitation.series import FourierSeries
 from identify.rotations import FloatArray
 
-_SMOOTH_MIN = 12.0  # power of the smooth minimum over the three limits: 1 / 12 of ln 3 below the minimum at most
+_SMOOTH_MIN = (
+    12.0  # power of the smooth minimum over the three limits: 1 / 12 of ln 3 below the minimum at most
+)
 _ROUNDING = 1.0 - 1e-7
 
 
@@ -101,11 +103,17 @@ class ShapeMapping:
         fast = np.max(np.abs(series_bounds(shape, 1)), axis=0)
         hard = np.max(np.abs(series_bounds(shape, 2)), axis=0)
         room = self.limits.upper - self.limits.lower
-        size = share * _ROUNDING * np.minimum(
-            room / (high - low), np.minimum(self.limits.velocity / fast, self.limits.acceleration / hard)
+        size = (
+            share
+            * _ROUNDING
+            * np.minimum(
+                room / (high - low), np.minimum(self.limits.velocity / fast, self.limits.acceleration / hard)
+            )
         )
         offset = self.limits.lower - size * low + place * (room - size * (high - low))
-        return FourierSeries(self.fundamental_hz, offset, size[:, None] * shape.cosine, size[:, None] * shape.sine)
+        return FourierSeries(
+            self.fundamental_hz, offset, size[:, None] * shape.cosine, size[:, None] * shape.sine
+        )
 
     def x_of(self, series: FourierSeries) -> FloatArray:
         """Invert: the x whose motion is the given one, or the nearest inside the limits (warm start)."""
@@ -194,7 +202,10 @@ def smooth_motion(mapping: ShapeMapping, x: FloatArray, sharpness: float) -> Smo
 
 
 def _pull_back(
-    mapping: ShapeMapping, x: FloatArray, parts: tuple[FloatArray, ...], bars: tuple[FloatArray, FloatArray, FloatArray]
+    mapping: ShapeMapping,
+    x: FloatArray,
+    parts: tuple[FloatArray, ...],
+    bars: tuple[FloatArray, FloatArray, FloatArray],
 ) -> FloatArray:
     unit, place, share, s, sd, sdd, high, low, high_w, low_w, fast_w, hard_w, needs, total, size = parts
     q_bar, qd_bar, qdd_bar = bars

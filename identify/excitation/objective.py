@@ -13,6 +13,7 @@ from identify.excitation.series import FourierSeries
 from identify.excitation.workspace import Workspace, clearances
 from identify.rotations import FloatArray
 
+_STEP = 1e-6
 _TORQUE_MARGIN, _DISTANCE_SCALE_M = 0.01, 0.05
 CHECK_POINTS = 400  # grid of a period on which finished motions are compared
 
@@ -41,7 +42,9 @@ class Problem:
 
     def matrix_of(self, series: FourierSeries) -> FloatArray:
         """Information matrix of a finished motion."""
-        return self.information.sample(*series.evaluate(series.grid_s(CHECK_POINTS))).information(self.samples)
+        return self.information.sample(*series.evaluate(series.grid_s(CHECK_POINTS))).information(
+            self.samples
+        )
 
     def quick_value(self, x: FloatArray, sharpness: float) -> float:
         """Criterion of a start, without gradient or penalties."""
@@ -49,7 +52,9 @@ class Problem:
         sample = self.information.sample(motion.q, motion.qd, motion.qdd, smooth=True)
         return self.criterion(sample.information(self.samples))[0]
 
-    def value_and_gradient(self, x: FloatArray, sharpness: float, stiffness: float) -> tuple[float, FloatArray]:
+    def value_and_gradient(
+        self, x: FloatArray, sharpness: float, stiffness: float
+    ) -> tuple[float, FloatArray]:
         """Evaluate the objective.
 
         Args:
@@ -64,11 +69,28 @@ class Problem:
         sample, pull_back = self.information.differentiate(motion.q, motion.qd, motion.qdd)
         factor = self.samples / motion.q.shape[1]
         value, matrix_bar = self.criterion(sample.information(self.samples))
-        columns_bar = 2.0 * factor * np.tensordot(matrix_bar, sample.columns, axes=([0], [1])).transpose(1, 0, 2)
+        columns_bar = (
+            2.0 * factor * np.tensordot(matrix_bar, sample.columns, axes=([0], [1])).transpose(1, 0, 2)
+        )
         torque_value, torque_bar = self._torque_penalty(sample.torque, stiffness)
         q_bar, qd_bar, qdd_bar = pull_back(columns_bar, torque_bar)
         distance_value, distance_bar = self._distance_penalty(motion.q, stiffness)
-        return value + torque_value + distance_value, motion.pull_back(q_bar + distance_bar, qd_bar, qdd_bar)
+        gradient = motion.pull_back(q_bar + distance_bar, qd_bar, qdd_bar)
+        if self.information.effects:
+            gradient += self._through_effects(x, sharpness, columns_bar[:, self.information.baseline :])
+        return value + torque_value + distance_value, gradient
+
+    def _through_effects(self, x: FloatArray, sharpness: float, effects_bar: FloatArray) -> FloatArray:
+        """Share of the gradient through the effects' columns, which may look along time (delays, derivatives)."""
+
+        def weighted(z: FloatArray) -> float:
+            motion = smooth_motion(self.mapping, z, sharpness)
+            return float(
+                np.sum(effects_bar * self.information.whitened_effects(motion.q, motion.qd, motion.qdd))
+            )
+
+        here = weighted(x)
+        return np.array([(weighted(x + step) - here) / _STEP for step in _STEP * np.eye(len(x))])
 
     def _torque_penalty(self, torque: FloatArray, stiffness: float) -> tuple[float, FloatArray]:
         limit = (self.mapping.limits.effort * (1.0 - _TORQUE_MARGIN))[:, None]
@@ -82,4 +104,3 @@ class Problem:
         lack = np.maximum(0.1 - found.distance_m / _DISTANCE_SCALE_M, 0.0)
         slope = -2.0 * stiffness * lack / _DISTANCE_SCALE_M
         return stiffness * float(np.sum(lack**2)), np.einsum("kn,kjn->jn", slope, found.gradient)
-

@@ -62,7 +62,9 @@ class Ramp:
         q, first, second = series.evaluate(phase)
         return q, first * rate, second * rate**2 + first * slope
 
-    def evaluate_out(self, series: FourierSeries, t_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def evaluate_out(
+        self, series: FourierSeries, t_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Motion of the ramp out, that begins at phase zero and ends at rest after ``duration_s``."""
         phase, rate, slope = self.phase_speed(self.duration_s - t_s)
         q, first, second = series.evaluate(-phase)

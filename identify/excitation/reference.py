@@ -22,7 +22,9 @@ from identify.rotations import FloatArray
 # the guess where nothing is known: uniform links, their density such that the rigid torques reach this share
 # of the effort limits on random motions; Coulomb friction and viscous friction at top speed this share
 _EFFORT_SHARE, _FRICTION_SHARE = 0.5, 0.06
-_DENSITY_KG_M = 30.0  # per metre of link where no effort limit scales it: an industrial arm of the 10 kg class
+_DENSITY_KG_M = (
+    30.0  # per metre of link where no effort limit scales it: an industrial arm of the 10 kg class
+)
 _SHORTEST_M, _RADIUS_SHARE, _LATERAL = 0.15, 0.15, 0.1
 _SAMPLES, _SEED = 200, 1
 
@@ -71,7 +73,12 @@ def _theta(model: Model, links: FloatArray, friction: Mapping[str, float]) -> Fl
 
 
 def drive_torque(
-    model: Model, theta: FloatArray, q: FloatArray, qd: FloatArray, qdd: FloatArray, sign: FloatArray | None = None
+    model: Model,
+    theta: FloatArray,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    sign: FloatArray | None = None,
 ) -> FloatArray:
     """Predict the drive torques [N.m or N], shape (n, N)."""
     rows = model.drive_rows(q, qd, qdd, sign)
@@ -123,7 +130,9 @@ def reference_from_description(model: Model, limits: MotionLimits) -> ReferenceM
     friction = f"friction guessed as {_FRICTION_SHARE:.0%} of the effort limits"
     if not missing.any():
         return ReferenceModel(theta, "urdf", f"Inertials of the URDF; {friction}.")
-    share = "the URDF has no inertials" if missing.all() else f"{missing.sum()} links lack inertials in the URDF"
+    share = (
+        "the URDF has no inertials" if missing.all() else f"{missing.sum()} links lack inertials in the URDF"
+    )
     return ReferenceModel(
         theta,
         "nominal guess",

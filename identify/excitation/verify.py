@@ -56,7 +56,11 @@ def ramp_torques(information: InformationModel, series: FourierSeries, ramp: Ram
 
 
 def verify(
-    information: InformationModel, limits: MotionLimits, workspace: Workspace, series: FourierSeries, ramp: Ramp
+    information: InformationModel,
+    limits: MotionLimits,
+    workspace: Workspace,
+    series: FourierSeries,
+    ramp: Ramp,
 ) -> Peaks:
     """Check a design before it is written.
 
@@ -82,7 +86,9 @@ def verify(
     hard = np.maximum(hard, ramp_acceleration(series, ramp))
     q, qd, qdd = series.evaluate(series.grid_s(_POINTS))
     torque = drive_torque(information.model, information.reference.theta, q, qd, qdd, np.zeros_like(qd))
-    effort = np.maximum(sampled_peak(torque) + coulomb_levels(information), ramp_torques(information, series, ramp))
+    effort = np.maximum(
+        sampled_peak(torque) + coulomb_levels(information), ramp_torques(information, series, ramp)
+    )
     for name, value, limit in (
         ("lower position", -low, -limits.lower),
         ("upper position", high, limits.upper),
@@ -96,7 +102,9 @@ def verify(
         violated = workspace_violation(robot, workspace, series)
         distance = least_distance_m(robot, workspace, q)
         if violated or distance < workspace.margin_m:
-            raise DesignError(f"The design fails its check: {violated or distance}; report it with the command.")
+            raise DesignError(
+                f"The design fails its check: {violated or distance}; report it with the command."
+            )
     return Peaks(low, high, speed, hard, effort, distance)
 
 

@@ -226,8 +226,12 @@ def clearances(robot: Robot, workspace: Workspace, q: FloatArray) -> Clearances:
         gradients.append(np.einsum("in,ijn->jn", slope, jacobians[i] - jacobians[j]))
         moving.append(between)
     if not names:
-        return Clearances((), np.zeros((0, q.shape[1])), np.zeros((0, *q.shape)), np.zeros((0, 3, q.shape[1])))
-    return Clearances(tuple(names), np.array(distances) - workspace.margin_m, np.array(gradients), np.array(moving))
+        return Clearances(
+            (), np.zeros((0, q.shape[1])), np.zeros((0, *q.shape)), np.zeros((0, 3, q.shape[1]))
+        )
+    return Clearances(
+        tuple(names), np.array(distances) - workspace.margin_m, np.array(gradients), np.array(moving)
+    )
 
 
 def check_workspace(robot: Robot, workspace: Workspace) -> None:
@@ -238,12 +242,18 @@ def check_workspace(robot: Robot, workspace: Workspace) -> None:
     """
     for sphere in workspace.spheres:
         if not -1 <= sphere.link < robot.n:
-            raise DesignError(f"Sphere '{sphere.name}' sits on link {sphere.link}, but the robot has links 0 to {robot.n - 1}.")
+            raise DesignError(
+                f"Sphere '{sphere.name}' sits on link {sphere.link}, but the robot has links 0 to {robot.n - 1}."
+            )
         if sphere.radius_m < 0.0:
-            raise DesignError(f"Sphere '{sphere.name}' has the radius {sphere.radius_m:g} m; give zero or more.")
+            raise DesignError(
+                f"Sphere '{sphere.name}' has the radius {sphere.radius_m:g} m; give zero or more."
+            )
     for i, j in workspace.pairs:
         if not (0 <= i < len(workspace.spheres) and 0 <= j < len(workspace.spheres)):
-            raise DesignError(f"Pair {i}, {j} names a sphere that does not exist: there are {len(workspace.spheres)}.")
+            raise DesignError(
+                f"Pair {i}, {j} names a sphere that does not exist: there are {len(workspace.spheres)}."
+            )
 
 
 def box_around_plate(robot: Robot, size_m: tuple[float, float, float]) -> Box | None:
