@@ -157,7 +157,7 @@ def _notes(estimate: Estimate, found: Consistency, absent: list[str]) -> tuple[s
     if found.filled:
         notes.append(
             f"The data fix the base parameters, not every link parameter: {found.filled} directions among "
-            f"masses, first moments and inertias are filled by the bodies nearest to a prior ({found.prior}); "
+            f"masses, first moments and inertias are filled by bodies nearest to a prior ({found.prior}); "
             "they change no torque that the model explains."
         )
     if estimate.model.kind == "external":
