@@ -230,13 +230,13 @@ class DriveBus:
 
     def _counts(self, targets_rad: Sequence[float]) -> list[int]:
         if len(targets_rad) != len(self._axes):
-            raise ConfigError(f"{len(self._axes)} set points are needed for a cycle, {len(targets_rad)} came.")
+            raise ConfigError(f"{len(self._axes)} set points are needed a cycle, {len(targets_rad)} came.")
         counts = []
         for axis, target_rad in zip(self._axes, targets_rad, strict=True):
             if not abs(target_rad) < _LARGEST_COUNT * abs(axis.units.rad_per_count):
                 raise ConfigError(
-                    f"The set point {target_rad} rad of {axis.name} cannot be sent: its drive counts 32 bits; "
-                    "check the trajectory."
+                    f"The set point {target_rad} rad of {axis.name} cannot be sent: its drive counts 32 "
+                    "bits; check the trajectory."
                 )
             counts.append(axis.units.counts(target_rad))
         return counts

@@ -26,9 +26,8 @@ class CanLink:
     between both clocks, which is taken again when the wall clock was stepped (`clock_steps` counts them).
     """
 
-    clock_steps = 0
-
     def __init__(self, config: CanConfig) -> None:
+        self.clock_steps = 0
         self._config = config
         self._bus: Any = _open_bus(config)
         self._synthetic: deque[Frame] = deque()
