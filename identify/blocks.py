@@ -93,11 +93,8 @@ def nominal_torque(model: Model, data: Dataset) -> Signal:
 def _sorted_samples(
     signal: Signal, window: PeriodWindow, bins: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Order samples by their place in the period: order, bin, period, number of bins found."""
-    phase = (signal.t_s - window.start_s) / window.period_s * bins
-    shift = np.angle(np.mean(np.exp(2j * np.pi * phase))) / (2.0 * np.pi)  # centre the samples in their bins
-    index = np.round(phase - shift).astype(int)
-    period, place = np.divmod(index, bins)
+    """Order samples by their place in the period: order, bin, period, instants."""
+    period, place = window.bins_of(signal.t_s, bins)
     order = np.argsort(place, kind="stable")
     return order, place[order], period[order], signal.t_s[order]
 

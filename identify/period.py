@@ -37,6 +37,21 @@ class PeriodWindow:
         """End of the last period used [s]."""
         return self.start_s + self.periods * self.period_s
 
+    def bins_of(self, t_s: FloatArray, bins: int) -> tuple[FloatArray, FloatArray]:
+        """Sort instants into bins of the period, each bin centred on the samples' common phase.
+
+        Args:
+            t_s: instants [s], shape (N,).
+            bins: number of bins a period.
+
+        Returns:
+            Period and bin of every instant, each shape (N,).
+        """
+        phase = (t_s - self.start_s) / self.period_s * bins
+        shift = np.angle(np.mean(np.exp(2j * np.pi * phase))) / (2.0 * np.pi)
+        period, place = np.divmod(np.round(phase - shift).astype(int), bins)
+        return period, place
+
     @property
     def fundamental_hz(self) -> float:
         """Fundamental frequency [Hz]."""

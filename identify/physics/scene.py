@@ -105,18 +105,20 @@ class Scene:
 
     @cached_property
     def load(self) -> FloatArray:
-        """Torque that the gears carry: bodies, gravity and compensation, without friction and rotor; (n, B).
+        """Rigid-body torque of the links on every drive, without friction, offset and rotor, shape (n, B).
 
-        The offset counts as friction's, but over a limited travel it cannot be told from the constant part of a
-        Fourier compensation: large amounts of both cancel. There the two stay together.
+        With the plate the links' gravity is known apart from a compensation spring and stands here whole; without
+        it gravity and spring cannot be told apart and their sum stands here.
         """
-        groups = ("inertial", "gravity_compensation")
-        compensated = [j.name for j in self.robot.joints if j.drive.gravity_harmonics > 0]
-        keep = np.array(
-            [p.group in groups or (p.group == "offset" and p.joint in compensated) for p in self.model.parameters]
-        )
-        rows = self.model.drive_rows(self.q, self.qd, self.qdd)
-        return np.tensordot(rows.columns[:, keep], self.theta[keep], axes=([1], [0]))
+        basis, count = self.model.basis, len(self.model.basis.columns)
+        if self.model.kind != "combined":
+            keep = np.array([p.group in ("inertial", "gravity_compensation") for p in self.model.parameters])
+            rows = self.model.drive_rows(self.q, self.qd, self.qdd)
+            return np.tensordot(rows.columns[:, keep], self.theta[keep], axes=([1], [0]))
+        links = to_drives(self.robot, rigid_columns(self.robot, self.q, self.qd, self.qdd, external=False).internal)
+        inside = basis.columns < links.shape[1]  # base columns that are links, not rotors
+        weights = (basis.mixing @ self.theta[:count])[inside]
+        return np.tensordot(links[:, basis.columns[inside]], weights, axes=([1], [0]))
 
     @cached_property
     def _plate_offsets(self) -> FloatArray:
