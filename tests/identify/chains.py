@@ -62,13 +62,14 @@ def _text(vector):
 def urdf_text(description):
     parts = ['<robot name="chain"><link name="base"/>']
     for k, b in enumerate(description.bodies):
-        parent = f"l{k - 1}" if k else "base"
-        i = b.principal
+        xx, yy, zz = (f"{moment:.17g}" for moment in b.principal)
         parts.append(
-            f'<link name="l{k}"><inertial><origin xyz="{_text(b.com)}" rpy="{_text(b.com_rpy)}"/><mass value="{b.mass:.17g}"/>'
-            f'<inertia ixx="{i[0]:.17g}" ixy="0" ixz="0" iyy="{i[1]:.17g}" iyz="0" izz="{i[2]:.17g}"/></inertial></link>'
-            f'<joint name="j{k}" type="{b.kind}"><parent link="{parent}"/><child link="l{k}"/>'
-            f'<origin xyz="{_text(b.xyz)}" rpy="{_text(b.rpy)}"/><axis xyz="{_text(b.axis)}"/></joint>'
+            f'<link name="l{k}"><inertial><origin xyz="{_text(b.com)}" rpy="{_text(b.com_rpy)}"/>'
+            f'<mass value="{b.mass:.17g}"/>'
+            f'<inertia ixx="{xx}" ixy="0" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"/></inertial></link>'
+            f'<joint name="j{k}" type="{b.kind}"><parent link="{f"l{k - 1}" if k else "base"}"/>'
+            f'<child link="l{k}"/><origin xyz="{_text(b.xyz)}" rpy="{_text(b.rpy)}"/>'
+            f'<axis xyz="{_text(b.axis)}"/></joint>'
         )
     return "".join(parts) + "</robot>"
 
@@ -80,26 +81,29 @@ def _quat(rpy):
 
 def mjcf_text(description):
     """The same chain on a free, massless base whose six generalised forces are the base's reaction."""
-    head, tail = [], []
-    for k, b in enumerate(description.bodies):
-        joint = {"revolute": "hinge", "prismatic": "slide"}.get(b.kind)
-        head.append(
-            f'<body name="l{k}" pos="{_text(b.xyz)}" quat="{_quat(b.rpy)}">'
-            + (f'<joint name="j{k}" type="{joint}" axis="{_text(b.axis)}"/>' if joint else "")
-            + f'<inertial pos="{_text(b.com)}" quat="{_quat(b.com_rpy)}" mass="{b.mass:.17g}" diaginertia="{_text(b.principal)}"/>'
-        )
-        tail.append("</body>")
+    head = [_mjcf_body(k, body) for k, body in enumerate(description.bodies)]
     return (
-        f'<mujoco><compiler angle="radian"/><option gravity="{_text(description.gravity)}"><flag contact="disable"/></option>'
-        '<worldbody><body name="base"><freejoint/><inertial pos="0 0 0" mass="1e-12" diaginertia="1e-12 1e-12 1e-12"/>'
+        f'<mujoco><compiler angle="radian"/><option gravity="{_text(description.gravity)}">'
+        '<flag contact="disable"/></option><worldbody><body name="base"><freejoint/>'
+        '<inertial pos="0 0 0" mass="1e-12" diaginertia="1e-12 1e-12 1e-12"/>'
         + "".join(head)
-        + "".join(tail)
+        + "</body>" * len(head)
         + "</body></worldbody></mujoco>"
     )
 
 
+def _mjcf_body(k, b):
+    joint = {"revolute": "hinge", "prismatic": "slide"}.get(b.kind)
+    return (
+        f'<body name="l{k}" pos="{_text(b.xyz)}" quat="{_quat(b.rpy)}">'
+        + (f'<joint name="j{k}" type="{joint}" axis="{_text(b.axis)}"/>' if joint else "")
+        + f'<inertial pos="{_text(b.com)}" quat="{_quat(b.com_rpy)}" mass="{b.mass:.17g}" '
+        f'diaginertia="{_text(b.principal)}"/>'
+    )
+
+
 def oracle_loads(description, q, qd, qdd):
-    """Joint forces (n, N) and the wrench on the base (6, N) about its origin, by MuJoCo's inverse dynamics."""
+    """Joint forces (n, N) and the base wrench (6, N) about its origin, by MuJoCo's inverse dynamics."""
     model = mujoco.MjModel.from_xml_string(mjcf_text(description))
     data, out = mujoco.MjData(model), []
     for k in range(q.shape[1]):

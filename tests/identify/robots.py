@@ -8,7 +8,7 @@ from identify.inertia import parameters_from_body
 from identify.robot import Robot
 from service.robots import load_robot
 
-# plausible bodies of an arm of this size: mass [kg], centre of mass [m], principal moments [kg.m2], turned by rpy
+# plausible bodies: mass [kg], centre of mass [m], principal moments [kg.m2] and their rpy [rad]
 _BODIES = (
     (38.0, (0.05, 0.03, -0.10), (5.4, 5.1, 6.0), (0.02, 0.03, 0.01)),
     (36.0, (0.02, 0.10, 0.25), (4.5, 4.3, 0.6), (0.05, -0.04, 0.02)),

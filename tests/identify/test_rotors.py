@@ -59,7 +59,7 @@ def test_the_gear_ratio_enters_currents_squared_and_the_plate_once(states):
 
 
 def test_coupled_rotors_on_the_base_follow_lagrange(states):
-    """Motors on the base: T = sum Im (C qd)^2 / 2, so tau = C' Im C qdd; drives get u with u . D qd = tau . qd."""
+    """Motors on the base: T = sum Im (C qd)^2 / 2, so tau = C' Im C qdd; u . D qd = tau . qd for drives."""
     rng = np.random.default_rng(0)
     coupling = np.diag([N1, N2, N3]) @ (np.eye(3) + 0.4 * rng.normal(size=(3, 3)))
     robot = ir361()

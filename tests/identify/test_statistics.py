@@ -78,7 +78,7 @@ def test_maximum_likelihood_is_markov_with_noiseless_encoders(run):
 
 
 def test_maximum_likelihood_allows_for_noisy_encoders(run):
-    """With coarse encoders the trajectory errs by more than the torques' noise: only ML then holds its intervals."""
+    """With coarse encoders the trajectory errs by more than the torques' noise: only ML then holds."""
     data = [synthetic.with_noise(run, np.random.default_rng([5, k]), encoder=1e-3) for k in range(8)]
     z = {}
     for estimator in ("markov", "ml"):

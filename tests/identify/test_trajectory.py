@@ -87,7 +87,7 @@ def test_the_papers_filter_delays_by_20_4_ms():
 
 
 def test_averaged_rows_stand_at_the_mean_of_their_samples_instants():
-    """A plate with its own clock: averaging its rows gives its averaged readings, with nothing interpolated."""
+    """A plate with its own clock: its averaged rows give its averaged readings, nothing interpolated."""
     run = synthetic.noise_free(plate_clock=synthetic.Clock(ppm=60.0, phase_s=4e-3, jitter_s=1e-3, loss=0.01))
     window = PeriodWindow(4.0, 0.0, 8, False)
     trajectory = fit_trajectory(run.data.position, window, 5)
