@@ -161,7 +161,7 @@ def _notes(estimate: Estimate, found: Consistency, absent: list[str]) -> tuple[s
             "they change no torque that the model explains."
         )
     if estimate.model.kind == "external":
-        notes.append("An external estimate sees no friction, motors or springs: the files have none.")
+        notes.append("An external estimate sees no friction and no springs: the files have none of either.")
     if absent:
         notes.append(f"Not identifiable in this run and taken as zero: {', '.join(absent)}.")
     if not estimate.content.get("intervals_valid", True):

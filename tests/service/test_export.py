@@ -25,12 +25,14 @@ SAMPLES = Path(__file__).resolve().parents[3] / "shared/data/ir361/samples"
 SLED_URDF = """<?xml version="1.0"?>
 <!-- a robot on a rail -->
 <robot name="sled">
-  <link name="floor"><inertial><mass value="9"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="floor"><inertial><mass value="9"/>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <link name="cart"/><link name="mast"/><link name="arm"/><link name="hand"/>
   <joint name="rail" type="prismatic"><parent link="floor"/><child link="cart"/>
     <origin xyz="0.1 0 0.2" rpy="0.3 -0.2 0.5"/><axis xyz="1 0.2 0"/>
     <limit lower="-1" upper="1" velocity="2" effort="500"/></joint>
-  <joint name="bolt" type="fixed"><parent link="cart"/><child link="mast"/><origin xyz="0 0 0.4" rpy="0 0 0.7"/></joint>
+  <joint name="bolt" type="fixed"><parent link="cart"/><child link="mast"/>
+    <origin xyz="0 0 0.4" rpy="0 0 0.7"/></joint>
   <joint name="turn" type="continuous"><parent link="mast"/><child link="arm"/>
     <origin xyz="0.05 0.1 0.2" rpy="0.1 0.2 0.3"/><axis xyz="0 0 1"/></joint>
   <joint name="bend" type="revolute"><parent link="arm"/><child link="hand"/>
@@ -196,8 +198,7 @@ def test_the_urdf_has_the_estimate_s_base_parameters(folder, capsys):
     assert all(np.linalg.eigvalsh(pseudo_inertia(link))[0] > 0 for link in chain.parameters)
 
 
-def test_simulated_motion_equals_the_truth_model(folder, capsys):
-    """The truth's bodies in a hand-written simulation and the exported ones, other bodies, accelerate alike."""
+def test_a_simulated_step_obeys_the_estimate_s_equation_of_motion(folder, capsys):
     loaded = sled(compensation="")
     raw = raw_of(loaded) | {
         f"{j}.{t}": 0.0 for j in ("rail", "turn", "bend") for t in ("coulomb", "offset", "asymmetric_viscous")
@@ -298,7 +299,6 @@ def test_the_original_document_is_kept(folder, capsys):
     assert float(dynamics.get("friction")) == pytest.approx(6.0)
     assert root.find("joint[@name='bolt']/dynamics") is None
     sidecar = json.loads((folder / ("o.xml" + SIDECAR_SUFFIX)).read_text())
-    assert [j["offset"] for j in sidecar["joints"]][0] == pytest.approx(0.7, abs=30)
     assert sidecar["joints"][1]["rotor"]["carrier"] == "cart"
     assert sidecar["joints"][2]["mjcf_spring"]["largest_torque_left_over"] >= 0.0
 
