@@ -63,6 +63,26 @@ class BodySpace:
         return float(min(eigenvalues.min(), z[SIZE * self.links :].min(initial=np.inf)))
 
 
+def onto(rows: FloatArray, values: FloatArray, z: FloatArray) -> FloatArray:
+    """Move z by the least that gives functionals their values to rounding.
+
+    Args:
+        rows: independent functionals, shape (k, Z).
+        values: what they must be, shape (k,).
+        z: a point that nearly has them, shape (Z,).
+
+    Returns:
+        The point, shape (Z,).
+    """
+    if len(rows) == 0:
+        return z
+    norms = np.linalg.norm(rows, axis=1)
+    q, r = np.linalg.qr((rows / norms[:, None]).T)
+    for _ in range(2):  # the second step removes the rounding of the first
+        z = z + q @ np.linalg.solve(r.T, (values - rows @ z) / norms)
+    return z
+
+
 def body_space(prior: Prior) -> BodySpace:
     """Choose the coordinates in which a prior is the identity.
 

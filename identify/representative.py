@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import null_space
 
-from identify.body_space import BASIS, IDENTITY, SIZE, BodySpace
+from identify.body_space import BASIS, IDENTITY, SIZE, BodySpace, onto
 from identify.rotations import FloatArray
 
 _STEPS = 60
@@ -54,7 +54,7 @@ def nearest_to_prior(space: BodySpace, rows: FloatArray, start: FloatArray) -> F
     free = null_space(rows / np.linalg.norm(rows, axis=1)[:, None]) if len(rows) else np.eye(len(start))
     z, value = start, divergence(space, start)
     if free.shape[1] == 0:
-        return z
+        return onto(rows, rows @ start, z)
     for _ in range(_STEPS):
         slope, curvature = _slope_and_curvature(space, z)
         reduced = free.T @ slope
@@ -67,4 +67,4 @@ def nearest_to_prior(space: BodySpace, rows: FloatArray, start: FloatArray) -> F
             length *= 0.5
             moved = divergence(space, z + length * step)
         z, value = z + length * step, min(moved, value)
-    return z
+    return onto(rows, rows @ start, z)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identify.body_space import BodySpace
+from identify.body_space import BodySpace, onto
 from identify.errors import IdentifyError
 from identify.rotations import FloatArray
 
@@ -89,9 +89,7 @@ def roundest(space: BodySpace, rows: FloatArray, values: FloatArray) -> FloatArr
     linear = np.zeros(size + 1)
     linear[size] = -1.0
     z = _solve(np.zeros((size + 1, size + 1)), linear, a, b, cones)[:size]
-    if count:  # the equalities to rounding, whatever the solver's tolerance
-        z = z + np.linalg.lstsq(scaled, wanted - scaled @ z, rcond=None)[0]
-    return z
+    return onto(scaled, wanted, z)  # to rounding, whatever the solver's tolerance
 
 
 def nearest(

@@ -15,8 +15,8 @@ SCHEMA_VERSION = 1
 _NOTE = (
     "Torques of the drives that the MJCF does not hold: per joint offset + asymmetric_viscous * abs(speed) + "
     "sum of cos_l cos(l q) + sin_l sin(l q), minus the joint spring of the MJCF where there is one. A "
-    "rotor's spin momentum (gear_ratio * speed * inertia about axis in the frame of carrier) also acts on the "
-    "joints that move its carrier and on the base; the MJCF has only its armature."
+    "rotor's spin momentum (gear_ratio * speed * inertia about axis in the frame of carrier) also acts on "
+    "the joints that move its carrier and on the base; the MJCF has only its armature."
 )
 
 
