@@ -81,7 +81,7 @@ def open_real(*faults: Fault, axes: int = 3, **changes) -> Iterator[Bench]:
     channel = f"bench-{next(_channels)}"
     deadlines = Deadlines(boot_s=1.0, quick_stop_s=0.6, nmt_stop_s=0.4)
     # Half a second of patience: the machine that tests may be busy with something else.
-    settings = {"rate_hz": 25.0, "heartbeat_ms": 100, "heartbeat_patience": 5.0, "deadlines": deadlines}
+    settings = {"rate_hz": 50.0, "heartbeat_ms": 100, "heartbeat_patience": 5.0, "deadlines": deadlines}
     config = bus_config(axes, **{**settings, **changes})
     fleet = make_fleet(axes, rate_hz=config.rate_hz, plan=FaultPlan(faults))
     link = CanLink(CanConfig(interface="virtual", channel=channel))

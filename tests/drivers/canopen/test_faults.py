@@ -207,7 +207,7 @@ def test_vanished_sync_is_missing_in_all_axes(virtual_bench):
 def test_boot_names_what_is_wrong(bench, tmp_path, kind, error, words):
     profile = tmp_path / "named.toml"
     profile.write_text(
-        'name = "named"\nvendor = 0x5EED\nsync_periods_us = [6667, 40000]\nperiod_object = "1006h"'
+        'name = "named"\nvendor = 0x5EED\nsync_periods_us = [6667, 20000]\nperiod_object = "1006h"'
     )
     with bench(Fault(kind, node=2)) as made:
         axes = [axis.model_copy(update={"profile": str(profile)}) for axis in made.config.axes]
