@@ -86,6 +86,7 @@ def structured_covariance(
         Newey and West, Econometrica 55 (1987): Bartlett weights over the scores' autocovariance;
         Liang and Zeger, Biometrika 73 (1986): sums over clusters.
     """
+    solution = solution.unweighted or solution  # the scores are those of the equations that were solved
     size, first = solution.jacobian.shape[1], 0
     meat = np.zeros((size, size))
     for index, block in enumerate(blocks):

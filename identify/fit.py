@@ -14,7 +14,7 @@ from identify.fourier import FourierTrajectory, fit_trajectory, unfiltered
 from identify.free_motion import FreeOptions, Thinning, free_rows
 from identify.maximum_likelihood import maximise_likelihood
 from identify.model import Model, build_model
-from identify.noise import NoiseModel, noise_from_scatter
+from identify.noise import NoiseModel
 from identify.ordinary import ordinary_least_squares, unit_noise
 from identify.period import PeriodWindow, find_window
 from identify.robot import Robot
@@ -134,6 +134,17 @@ class Fit:
                 factor = 1.0 / self.solution.scale[joint] if joint >= 0 else 1.0
                 used = max(int(block.usable[k].sum()), 1)
                 result[channel] = float(np.sqrt(np.sum(rest[k] ** 2) / used) * abs(factor))
+        return result
+
+    @property
+    def relative_error(self) -> dict[str, float]:
+        """100 |u - u_hat| / |u| of every channel over the rows fitted [%]."""
+        result = {}
+        for block in self.rows.blocks:
+            rest = residual(block, self.solution.theta, self.solution.scale)
+            size = np.linalg.norm(np.where(block.usable, block.target, 0.0), axis=1)
+            share = 100.0 * np.linalg.norm(rest, axis=1) / np.maximum(size, 1e-300)
+            result |= dict(zip(block.channels, share.tolist(), strict=True))
         return result
 
 
@@ -257,9 +268,13 @@ def _fit_free(model: Model, data: Dataset, options: FitOptions, warnings: list[s
 
 
 def _noise_from_residual(block: Block, theta: FloatArray, scale: FloatArray) -> NoiseModel:
+    """Weights from the residual: its size per channel, not its colour, which is misfit as much as noise."""
     rest = residual(block, theta, scale)
     share = max(block.rows / len(block.channels) - len(theta) / len(block.channels), 1.0)
-    return noise_from_scatter(rest[:, None, :], share, replicated=False)
+    variance = np.sum(rest**2, axis=1) / share
+    variance = np.maximum(variance, 1e-12 * max(float(variance.max(initial=0.0)), 1e-12))
+    white = tuple(np.ones(1) for _ in block.channels)
+    return NoiseModel(white, np.diag(variance), np.sqrt(variance), share, False)
 
 
 def _conclude(partial: Fit, warnings: list[str]) -> Fit:

@@ -71,4 +71,5 @@ def ordinary_least_squares(
         chi2=float(whitened @ whitened),
         whitened=whitened,
         jacobian=weighted.jacobian,
+        unweighted=plain,
     )

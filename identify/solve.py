@@ -39,6 +39,8 @@ class Solution:
         condition_number: of the whitened, column-normalised matrix over the directions seen.
         jacobian: whitened Jacobian, shape (rows, P + k).
         whitened: whitened residuals, shape (rows,).
+        unweighted: for ordinary least squares the solution in its own, equal weights, whose normal
+            equations the estimate solves; None where the weights are those of the noise.
     """
 
     theta: FloatArray
@@ -53,6 +55,7 @@ class Solution:
     condition_number: float
     jacobian: FloatArray
     whitened: FloatArray
+    unweighted: Solution | None = None
 
     @property
     def dof(self) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from identify.diagnosis.candidates import project
+from identify.diagnosis.candidates import log_chance
 from identify.diagnosis.problem import Problem
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
@@ -110,20 +110,20 @@ def _curve_columns(problem: Problem, block_index: int, channel: int, values: Flo
 
 def _curve_test(
     problem: Problem, basis: FloatArray, residual: FloatArray, where: tuple[int, int], variable: str, values: FloatArray
-) -> tuple[Structure, FloatArray]:
+) -> Structure:
     block_index, channel = where
     block = problem.blocks[block_index]
     columns, labels = _curve_columns(problem, block_index, channel, values)
-    rest = project(basis, columns)
-    left, sizes, right = np.linalg.svd(rest, full_matrices=False)
-    seen = sizes > 1e-3 * max(np.linalg.norm(columns, axis=0).max(), 1e-300)
-    toward = left[:, seen].T @ residual
-    curve = right[seen].T @ (toward / sizes[seen])
-    band = np.sqrt(np.sum((right[seen].T / sizes[seen]) ** 2, axis=1))
+    inside = basis.T @ columns
+    squares, vectors = np.linalg.eigh(columns.T @ columns - inside.T @ inside)  # of the columns off the basis
+    seen = squares > 1e-6 * max(float(np.sum(columns**2, axis=0).max()), 1e-300)
+    toward = (vectors[:, seen].T @ (columns.T @ residual)) / np.sqrt(squares[seen])
+    curve = vectors[:, seen] @ (toward / np.sqrt(squares[seen]))
+    band = np.sqrt(np.sum(vectors[:, seen] ** 2 / squares[seen], axis=1))
     picked = values if problem.fit.thinning is None else problem.fit.thinning.pick(values)
     centres = np.array([picked[labels == k].mean() if (labels == k).any() else np.nan for k in range(_REGIONS)])
     gain, width = float(toward @ toward), int(seen.sum())
-    return Structure(block.channels[channel], variable, gain, width, 1.0, centres, curve, band), toward
+    return Structure(block.channels[channel], variable, gain, width, 1.0, centres, curve, band)
 
 
 def examine(problem: Problem, basis: FloatArray, residual: FloatArray, curves: bool = True) -> Adequacy:
@@ -148,10 +148,10 @@ def examine(problem: Problem, basis: FloatArray, residual: FloatArray, curves: b
             states = variables_of(problem.scenes[block_index])
             for channel in range(len(block.channels)):
                 for variable, values in states.items():
-                    found.append(_curve_test(problem, basis, residual, (block_index, channel), variable, values)[0])
+                    found.append(_curve_test(problem, basis, residual, (block_index, channel), variable, values))
     count = len(found) + len(probability)
     corrected = [
-        Structure(s.channel, s.variable, s.gain, s.width, _corrected(stats.chi2.logsf(s.gain, max(s.width, 1)), count), s.centres, s.curve, s.band)
+        Structure(s.channel, s.variable, s.gain, s.width, _corrected(log_chance(np.array(s.gain), max(s.width, 1)), count), s.centres, s.curve, s.band)
         for s in found
     ]
     corrected.sort(key=lambda s: (s.p_value, -s.gain / max(s.width, 1)))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from identify.diagnosis.problem import Problem
 from identify.physics.effect import Effect, Place
@@ -17,6 +17,24 @@ from identify.rotations import FloatArray
 _SWALLOWED = 1.0 - 1e-5
 # two columns of one effect closer than this are one
 _SAME = 1e-6
+
+
+def log_chance(gain: FloatArray, width: int) -> FloatArray:
+    """Logarithm of the chi-square probability of gains with a number of degrees of freedom.
+
+    Args:
+        gain: drops in chi-square, any shape.
+        width: degrees of freedom.
+
+    Returns:
+        Natural logarithms, same shape; finite also where the probability underflows.
+    """
+    if width == 1:
+        return np.log(2.0) + special.log_ndtr(-np.sqrt(gain))
+    chance = special.chdtrc(width, gain)
+    half, x = 0.5 * width, 0.5 * np.maximum(gain, 1e-300)
+    tail = (half - 1.0) * np.log(x) - x - special.gammaln(half)  # leading term far out, where the function underflows
+    return np.where(chance > 1e-290, np.log(np.maximum(chance, 1e-300)), tail)
 
 
 @dataclass(frozen=True)
@@ -48,7 +66,7 @@ class Trial:
     @property
     def log_p(self) -> float:
         """Natural logarithm of the chi-square probability of its gain at this shape."""
-        return float(stats.chi2.logsf(self.gain, max(len(self.kept), 1)))
+        return float(log_chance(np.array(self.gain), max(len(self.kept), 1)))
 
     @property
     def penalised(self) -> float:
@@ -81,6 +99,7 @@ def trial(
     place: Place,
     shape: Mapping[str, float],
     columns: FloatArray | None = None,
+    projected: FloatArray | None = None,
 ) -> Trial | None:
     """Test one candidate at one shape.
 
@@ -92,6 +111,7 @@ def trial(
         place: where.
         shape: its nonlinear parameters.
         columns: its whitened columns, computed here when not given.
+        projected: the same off the basis, likewise.
 
     Returns:
         The trial, its gain 0 where the fitted values are not physical; None where the baseline swallows it.
@@ -100,14 +120,12 @@ def trial(
         Added-variable test: gain = |P_MX r|^2, chi-square with k degrees of freedom under the null.
     """
     columns = problem.columns(effect, place, shape) if columns is None else columns
-    if not np.isfinite(columns).all():
-        return None
     norms = np.linalg.norm(columns, axis=0)
     seen = np.flatnonzero(norms > 1e-12)
-    if len(seen) == 0:
+    if len(seen) == 0 or not np.isfinite(norms).all():
         return None
-    projected = project(basis, columns[:, seen])
-    q, r, order = _pivoted(projected)
+    rest = project(basis, columns[:, seen]) if projected is None else projected[:, seen]
+    q, r, order = _pivoted(rest)
     sizes = np.abs(np.diag(r))
     enough = sizes > np.maximum(np.sqrt(1.0 - _SWALLOWED) * norms[seen][order], _SAME * sizes.max(initial=0.0))
     count = int(np.argmin(enough)) if not enough.all() else len(enough)
@@ -171,18 +189,26 @@ def all_trials(
     Returns:
         The trials that the baseline does not swallow.
     """
-    result = []
-    for effect in effects:
-        if effect.progressive:
-            continue
+    keys: list[tuple[Effect, Place, dict[str, float]]] = []
+    for effect in (item for item in effects if not item.progressive):
         for place in effect.places(problem.scene):
-            for shape in shapes_of(effect):
-                key = (effect.name, place, tuple(shape.values()))
-                if key not in cache:
-                    cache[key] = problem.columns(effect, place, shape)
-                found = trial(problem, basis, residual, effect, place, shape, cache[key])
-                if found is not None:
-                    result.append(found)
+            keys += [(effect, place, shape) for shape in shapes_of(effect)]
+    columns = []
+    for effect, place, shape in keys:
+        key = (effect.name, place, tuple(shape.values()))
+        if key not in cache:
+            cache[key] = problem.columns(effect, place, shape)
+        columns.append(cache[key])
+    if not columns:
+        return []
+    projected = project(basis, np.hstack(columns))  # one product for all: many small ones are bound by memory
+    result, first = [], 0
+    for (effect, place, shape), own in zip(keys, columns, strict=True):
+        last = first + own.shape[1]
+        found = trial(problem, basis, residual, effect, place, shape, own, projected[:, first:last])
+        if found is not None:
+            result.append(found)
+        first = last
     return result
 
 

@@ -13,6 +13,7 @@ from identify.diagnosis.adequacy import Adequacy, examine
 from identify.diagnosis.augmented import Augmented, augment
 from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, progressive_tests
 from identify.diagnosis.blind_spots import blind_spots, place_name
+from identify.diagnosis.candidates import log_chance
 from identify.diagnosis.describe import carrying_channels, parameters_of, sentence_of, where_of
 from identify.diagnosis.findings import ChannelFit, Diagnosis, Finding, FoundParameter, Unexplained, Where, rounded
 from identify.diagnosis.held_out import held_out
@@ -170,7 +171,7 @@ def _findings(problem: Problem, selection: Selection, augmented: Augmented) -> t
     for named, item in zip(selection.named, augmented.additions, strict=True):
         parameters = parameters_of(problem, item)
         alternatives = tuple(dict.fromkeys(r.effect.name for r in named.rivals if r.effect.name != item.effect.name))[:4]
-        p = selection.null.p_value(float(stats.chi2.logsf(item.delta_chi2, max(item.freedom, 1))))
+        p = selection.null.p_value(float(log_chance(np.array(max(item.delta_chi2, 0.0)), max(item.freedom, 1))))
         joint = problem.scene.robot.joints[item.place.joint].name if item.place.joint is not None else None
         result.append(
             Finding(

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
-
-from identify.diagnosis.candidates import Trial
+from identify.diagnosis.candidates import Trial, log_chance
 from identify.rotations import FloatArray
 
 _DRAWS = 2000
@@ -56,7 +54,7 @@ def family_null(trials: list[Trial], rng: np.random.Generator) -> FamilyNull:
     for item in trials:
         width = len(item.kept)
         part = draws[first : first + width]
-        log_p = stats.chi2.logsf(np.sum(part**2, axis=0), width)
+        log_p = log_chance(np.sum(part**2, axis=0), width)
         signs = np.array([item.effect.coefficients[k].sign for k in item.kept])
         if signs.any():
             fitted = np.linalg.solve(item.triangle, part)
