@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -55,6 +55,7 @@ class Augmented:
         names: names of those parameters, ``effect@place.parameter``.
         residual: whitened residual, shape (rows,).
         chi2: its square.
+        joint_covariance: of (theta, free scales, the effects' free parameters), all of one fit.
     """
 
     theta: FloatArray
@@ -65,6 +66,7 @@ class Augmented:
     names: tuple[str, ...]
     residual: FloatArray
     chi2: float
+    joint_covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass
@@ -139,7 +141,7 @@ def unaugmented(fit: Fit) -> Augmented:
     solution, count = fit.solution, len(fit.model.parameters)
     theta = np.where(solution.identifiable[:count], solution.theta, 0.0)
     return Augmented(
-        theta, solution.scale, solution.covariance, (), np.zeros((0, 0)), (), solution.whitened, solution.chi2
+        theta, solution.scale, solution.covariance, (), np.zeros((0, 0)), (), solution.whitened, solution.chi2, solution.covariance
     )
 
 
@@ -207,5 +209,5 @@ def _result(
         names += [f"{label}.{name}" for name in member.free_shapes]
         first = own.stop
     return Augmented(
-        theta, scale, covariance[:base, :base], tuple(additions), covariance[base:, base:], tuple(names), rest, chi2
+        theta, scale, covariance[:base, :base], tuple(additions), covariance[base:, base:], tuple(names), rest, chi2, covariance
     )
