@@ -8,6 +8,7 @@ from typing import Any
 from daq.recording import Recording
 from identify.diagnosis.findings import Diagnosis, Finding
 from identify.fit import Fit
+from service.augmented_file import augmented_content
 from service.robots import LoadedRobot
 
 SCHEMA_VERSION = 1
@@ -94,6 +95,7 @@ def diagnosis_content(diagnosis: Diagnosis, fit: Fit, loaded: LoadedRobot, recor
         "blind_spots": _blind_spots(diagnosis),
         "fit": _fit_tables(diagnosis),
         "next_experiment": diagnosis.next_experiment,
+        "estimate": augmented_content(diagnosis, fit, loaded, recordings[0]),
         "location": {
             "internal_p": _number(location.internal_p),
             "external_p": _number(location.external_p),

@@ -67,7 +67,7 @@ def read_estimate(path: Path | str) -> Estimate:
     """Read an estimate and rebuild its model.
 
     Args:
-        path: ``estimate.json``.
+        path: ``estimate.json``, or ``diagnosis.json`` for the augmented estimate in it.
 
     Returns:
         The estimate.
@@ -76,6 +76,8 @@ def read_estimate(path: Path | str) -> Estimate:
         UsageError: missing or malformed, or not of the model its robot description gives.
     """
     content, source = read_json(path, "the estimate"), str(path)
+    if isinstance(content.get("estimate"), dict):
+        content = content["estimate"]
     if content.get("schema_version") != SCHEMA_VERSION:
         raise UsageError(
             f"Estimate {source} has schema_version {content.get('schema_version')!r}, but this version reads "

@@ -14,6 +14,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "inspect": ("inspect", "What is in a log, and whether it is fit for use."),
     "identify": ("identify", "Parameters, torque constants and covariance from a log."),
     "diagnose": ("diagnose", "The physics a model lacks: where, which, how much, and the proof."),
+    "simulate": ("simulate", "What a model says a recording's sensors would have shown, as a log."),
     "export": ("export", "An estimate as URDF and MJCF."),
     "import": ("import_", "A foreign recording (csv, npz, db3, mcap) as a log."),
     "recover": ("recover", "A broken log's intact part as a valid log."),
