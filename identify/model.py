@@ -28,6 +28,7 @@ from identify.structure import (
     to_drives,
 )
 
+_DIRECTION_SHARE = 1e-3
 _CHUNK = 2048  # samples a pass: the working set stays in the cache
 
 
@@ -134,8 +135,19 @@ class Model:
             out[:, -offsets:] = np.eye(6)[:, :, None]
 
     def sign_unknown(self, qd: FloatArray, speed_std: FloatArray) -> FloatArray:
-        """Tell where a drive's direction is lost in the noise of its speed (three std), shape (n, N)."""
-        slow = np.abs(drive_velocity(self.robot, qd)) < 3.0 * speed_std[:, None]
+        """Tell where a drive's direction is not known for sure.
+
+        Args:
+            qd: joint velocities, shape (n, N).
+            speed_std: std of the drive speeds by encoder noise, shape (n,).
+
+        Returns:
+            True within three std of zero, widened by a thousandth of the usual speed: lines too small to be
+            kept move the instant of a reversal, and one wrong sign is twice the Coulomb friction; shape (n, N).
+        """
+        speed = drive_velocity(self.robot, qd)
+        usual = np.sqrt(np.mean(speed**2, axis=1))
+        slow = np.abs(speed) < (3.0 * speed_std + _DIRECTION_SHARE * usual)[:, None]
         rubs = np.array(["coulomb" in joint.drive.friction for joint in self.robot.joints])
         return slow & rubs[:, None]
 

@@ -96,32 +96,37 @@ def _time_tests(problem: Problem, residual: FloatArray) -> list[tuple[str, str, 
     return result
 
 
-def _curve_columns(problem: Problem, block_index: int, channel: int, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Whitened indicator columns of the regions of a state on one channel, and the regions' labels."""
+def _curve_columns(
+    problem: Problem, block_index: int, channel: int, values: FloatArray, weight: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Whitened columns of the regions of a state on one channel (times a weight), and the regions' labels."""
     block = problem.blocks[block_index]
-    if problem.fit.thinning is not None:
-        values = problem.fit.thinning.pick(values)
     edges = np.quantile(values, np.linspace(0.0, 1.0, _REGIONS + 1)[1:-1])
     labels = np.searchsorted(edges, values)
     raw = [np.zeros((len(b.channels), _REGIONS, b.target.shape[1])) for b in problem.blocks]
-    raw[block_index][channel, labels, np.arange(len(labels))] = block.usable[channel]
+    raw[block_index][channel, labels, np.arange(len(labels))] = block.usable[channel] * weight
     return problem.whiten(raw), labels
 
 
 def _curve_test(
     problem: Problem, basis: FloatArray, residual: FloatArray, where: tuple[int, int], variable: str, values: FloatArray
 ) -> Structure:
+    """Test one channel's residual as a curve over regions of a state; friction curves turn with the direction."""
     block_index, channel = where
+    scene, joint = problem.scenes[block_index], problem.blocks[block_index].joint[where[1]]
+    odd = variable.startswith("friction:")
+    weight = scene.direction[max(joint, 0)] if odd else np.ones(len(scene.t_s))
+    if problem.fit.thinning is not None:
+        values, weight = problem.fit.thinning.pick(values), problem.fit.thinning.pick(weight)
     block = problem.blocks[block_index]
-    columns, labels = _curve_columns(problem, block_index, channel, values)
+    columns, labels = _curve_columns(problem, block_index, channel, values, weight)
     inside = basis.T @ columns
     squares, vectors = np.linalg.eigh(columns.T @ columns - inside.T @ inside)  # of the columns off the basis
     seen = squares > 1e-6 * max(float(np.sum(columns**2, axis=0).max()), 1e-300)
     toward = (vectors[:, seen].T @ (columns.T @ residual)) / np.sqrt(squares[seen])
     curve = vectors[:, seen] @ (toward / np.sqrt(squares[seen]))
     band = np.sqrt(np.sum(vectors[:, seen] ** 2 / squares[seen], axis=1))
-    picked = values if problem.fit.thinning is None else problem.fit.thinning.pick(values)
-    centres = np.array([picked[labels == k].mean() if (labels == k).any() else np.nan for k in range(_REGIONS)])
+    centres = np.array([values[labels == k].mean() if (labels == k).any() else np.nan for k in range(_REGIONS)])
     gain, width = float(toward @ toward), int(seen.sum())
     return Structure(block.channels[channel], variable, gain, width, 1.0, centres, curve, band)
 
@@ -147,7 +152,12 @@ def examine(problem: Problem, basis: FloatArray, residual: FloatArray, curves: b
         for block_index, block in enumerate(problem.blocks):
             states = variables_of(problem.scenes[block_index])
             for channel in range(len(block.channels)):
+                if block.joint[channel] >= 0:
+                    own = problem.scene.robot.joints[block.joint[channel]].name
+                    states = states | {f"friction:{own}": problem.scenes[block_index].q[block.joint[channel]]}
                 for variable, values in states.items():
+                    if np.ptp(values) == 0.0 or (variable.startswith("friction:") and block.channels[channel] != variable[9:]):
+                        continue
                     found.append(_curve_test(problem, basis, residual, (block_index, channel), variable, values))
     count = len(found) + len(probability)
     corrected = [

@@ -31,7 +31,7 @@ LEVEL_REST = 0.002
 LEVEL_PROGRESS = 0.001
 LEVEL_CONSTANT = 0.001
 # a name stands only where what it leaves on its own channels is small against what it explains
-_LEFTOVER = 0.25
+_LEFTOVER = 0.10
 _SEED = 20240229  # the diagnosis of a recording must not change from run to run
 
 

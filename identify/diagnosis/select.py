@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.diagnosis.candidates import Trial, all_trials, best_by_place, project, refine, trial
+from identify.diagnosis.describe import carrying_channels
 from identify.diagnosis.null import FamilyNull, family_null
 from identify.diagnosis.problem import Problem
 from identify.physics.effect import Effect
@@ -14,6 +15,7 @@ from identify.rotations import FloatArray
 
 _MOST = 4  # effects in one recording
 _CLOSE = 12.0  # penalised gain within which candidates are refined and compared
+_POLISH = 0.04  # share of a stronger effect's gain below which a further name on its channels says nothing
 _RIVAL_GAP = 6.0  # BIC difference below which the data do not decide
 _RIVAL_COSINE = 0.95
 
@@ -101,11 +103,25 @@ def select(problem: Problem, effects: list[Effect], level: float, rng: np.random
         if not ranked or null.p_value(ranked[0].log_p) > level:
             break
         winner, rivals = _decide(problem, basis, residual, ranked)
+        if _only_polish(problem, winner, named):
+            break
         named.append(Named(winner, null.p_value(winner.log_p), rivals))
         columns = np.hstack([problem.columns(winner.effect, winner.place, winner.shape), tangent_columns(problem, winner)])
         basis = extend(basis, columns)
         residual = residual - basis @ (basis.T @ residual)
     return Selection(tuple(named), basis, residual, null, tuple(first))
+
+
+def _only_polish(problem: Problem, winner: Trial, named: list[Named]) -> bool:
+    """Whether a further effect merely mends the shape of a far stronger one on the same channels."""
+    home = set(_home(problem, winner))
+    return any(
+        winner.gain < _POLISH * item.trial.gain and home & set(_home(problem, item.trial)) for item in named
+    )
+
+
+def _home(problem: Problem, item: Trial) -> tuple[str, ...]:
+    return carrying_channels(problem, problem.columns(item.effect, item.place, item.shape) @ item.values)
 
 
 def _decide(
