@@ -47,9 +47,11 @@ _BODIES = {
     WRENCH: "std_msgs/Header header\ngeometry_msgs/Wrench wrench",
     # Raw streams keep what the wire carried: counts before scaling, and every clock that saw the sample.
     DRIVE_RAW: "std_msgs/Header header\nstring[] name\nuint64 device_stamp\nint64 host_receive_ns\n"
-    "uint32 cycle\nint32[] position\nint32[] velocity\nint32[] current\nuint32[] status_word",
+    "uint32 cycle\nint32[] position\nint32[] velocity\nint32[] current\nuint32[] status_word\n"
+    "int32[] demand\nint32[] target\nuint32[] flags\nint64[] receive_ns",
     FORCE_PLATE_RAW: "std_msgs/Header header\nuint64 device_stamp\nint64 host_receive_ns\nuint32 counter\n"
-    "uint32 status_word\nint32[] counts\nfloat32[] values\nfloat32 temperature",
+    "uint32 status_word\nint32[] counts\nfloat32[] values\nfloat32 temperature\nuint32 segment\nuint32 lost\n"
+    "float64[] wrench",
     CLOCK_SYNC: "std_msgs/Header header\nstring device\nuint64 device_stamp\nint64 host_receive_ns\n"
     "int64 mapped_ns\nfloat64 uncertainty_s",
     EVENT: "std_msgs/Header header\nstring name\nstring severity\nuint32 cycle\nstring text",

@@ -21,7 +21,7 @@ from drivers.canopen.power import ENABLE_OPERATION, Goal, PowerStage
 from drivers.canopen.profile import common_period_us, load_profile
 from drivers.canopen.report import CauseKind, SessionReport
 from drivers.canopen.sample import CycleSample, Flag
-from drivers.canopen.traffic import PRE_OPERATIONAL, RESET_COMMUNICATION, Traffic
+from drivers.canopen.traffic import PRE_OPERATIONAL, RESET_COMMUNICATION, STOP, Traffic
 from drivers.errors import (
     BusOffError,
     ConfigError,
@@ -174,6 +174,22 @@ class DriveBus:
                 self._ledger.trip(CauseKind.OPERATOR, reason, self._link.now_ns())
             return self._descend(Event.FINISH if reason is None else Event.TRIP)
         return self.report()
+
+    def halt(self) -> None:
+        """Stop at once: NMT stop to every drive, whose reaction to it brings them to rest; then let go.
+
+        Nothing is confirmed and no setting put back: for an operator who will not wait.
+        """
+        if self.phase is Phase.CLOSED:
+            return
+        try:
+            self._traffic.command(STOP)
+        except LinkError:
+            pass  # a dead bus: the drives stop by the missing heartbeat of this host
+        finally:
+            self._exchange.halt()
+            self._link.close()
+            self.phase = Phase.CLOSED
 
     def close(self) -> SessionReport:
         """Stop what still runs, put every changed setting back, release the link, even on a dead bus."""

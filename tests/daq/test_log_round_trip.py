@@ -121,6 +121,10 @@ def test_raw_topics_keep_counts_and_words(tmp_path):
                 velocity=[1, 2],
                 current=[3, 4],
                 status_word=[0x1637, 2**32 - 1],
+                demand=[5, 6],
+                target=[7, 8],
+                flags=[0, 1],
+                receive_ns=[9, -10],
             )
             log.write_raw(
                 "/clock_sync",
@@ -145,6 +149,9 @@ def test_raw_topics_keep_counts_and_words(tmp_path):
                 counts=range(i),
                 values=[0.5] * 6,
                 temperature=21.5,
+                segment=0,
+                lost=i,
+                wrench=[0.25] * 6,
             )
         log.write_event(logs.START_NS, logs.START_NS, 0, "fault", "error", 7, "the drive of a stopped")
         log.write_event(logs.START_NS, logs.START_NS, 1, "end", "info", 9, "done")

@@ -99,6 +99,12 @@ class RobotPlant:
         assert self._origin_ns is not None
         return self._origin_s + (time_ns - self._origin_ns) * 1e-9
 
+    def anchor(self, sync_ns: int) -> None:
+        """Lock the interpolation to the first SYNC at `sync_ns`, as drives do; the robot is still at rest."""
+        phase_s = (self.robot_time_s(sync_ns) - self._plant.time_s) % self._plant.period_s
+        shift_s = (1.0 - _RESERVE) * self._plant.period_s - phase_s
+        self._origin_s += shift_s % self._plant.period_s
+
     def advance_to(self, time_ns: int) -> None:
         """Run the robot up to `time_ns` of the bus and sample all joints once."""
         time_s = self.robot_time_s(time_ns)
