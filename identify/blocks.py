@@ -87,7 +87,10 @@ def nominal_torque(model: Model, data: Dataset) -> Signal:
             f"{data.source} has neither motor currents nor joint efforts, so the {model.kind} model has no "
             "torques to explain; record /motor_currents, or choose --model external where there is a plate."
         )
-    return data.effort
+    if model.robot.coupling is None:
+        return data.effort
+    # efforts are those of the joints; the drives of a coupled transmission share them, u = D^-T tau
+    return Signal(data.effort.t_s, np.linalg.solve(model.robot.drive_matrix.T, data.effort.values))
 
 
 def _sorted_samples(

@@ -193,11 +193,22 @@ def fit(robot: Robot, data: Dataset, options: FitOptions | None = None, model: M
     if options.estimator not in ESTIMATORS:
         raise ModelError(f"Estimator '{options.estimator}' is unknown; choose markov, ols or ml.")
     model = model or build_model(robot, choose_kind(robot, data, options.kind))
-    warnings: list[str] = []
+    warnings = _unknown_scale(model, data)
     window = _window(robot, data, options, warnings)
     if window is None:
         return _fit_free(model, data, options, warnings)
     return _fit_periodic(model, data, window, options, warnings)
+
+
+def _unknown_scale(model: Model, data: Dataset) -> list[str]:
+    """Say so where currents stand for torques without any torque constant."""
+    nameless = [joint.name for joint in model.robot.joints if joint.drive.torque_constant is None]
+    if model.kind != "internal" or data.current is None or not nameless:
+        return []
+    return [
+        f"No torque constant is known of {', '.join(nameless)}: its current is taken as 1 N.m/A, so every parameter "
+        "of that joint is known only up to this factor; add torque_constant to the robot file."
+    ]
 
 
 def _window(robot: Robot, data: Dataset, options: FitOptions, warnings: list[str]) -> PeriodWindow | None:
@@ -268,7 +279,7 @@ def _fit_free(model: Model, data: Dataset, options: FitOptions, warnings: list[s
 
 
 def _noise_from_residual(block: Block, theta: FloatArray, scale: FloatArray) -> NoiseModel:
-    """Weights from the residual: its size per channel, not its colour, which is misfit as much as noise."""
+    """Weights from the residual: its size per channel; its colour and correlation may be misfit."""
     rest = residual(block, theta, scale)
     share = max(block.rows / len(block.channels) - len(theta) / len(block.channels), 1.0)
     variance = np.sum(rest**2, axis=1) / share

@@ -10,6 +10,7 @@ from scipy import interpolate, signal
 from identify.blocks import Block, nominal_torque
 from identify.dataset import Dataset, Signal
 from identify.errors import UnusableDataError
+from identify.friction import drive_velocity
 from identify.model import Model, Rows
 from identify.robot import WRENCH_CHANNELS
 from identify.rotations import FloatArray
@@ -26,6 +27,7 @@ class FreeOptions:
         trim: samples dropped at either end.
         start_s: use the run from here on [s from its first sample].
         stop_s: use the run up to here.
+        slow: leave out drive rows at lower speeds [rad/s or m/s]: creeping friction is not Coulomb's.
     """
 
     bandwidth_hz: float | None = None
@@ -33,6 +35,7 @@ class FreeOptions:
     trim: int = 0
     start_s: float | None = None
     stop_s: float | None = None
+    slow: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def free_rows(model: Model, data: Dataset, options: FreeOptions = FreeOptions())
         position = Signal(position.t_s - shift, position.values)
     motion = smooth(position, options.bandwidth_hz)
     factor = options.decimate or max(1, int(0.8 * motion.rate_hz / (2.5 * motion.bandwidth_hz)))
-    channels, joint, rows, target, usable = _stacked(model, data, motion)
+    channels, joint, rows, target, usable = _stacked(model, data, motion, options.slow)
     thinning = Thinning(options.trim, factor)
     block = Block(
         channels,
@@ -136,7 +139,7 @@ def free_rows(model: Model, data: Dataset, options: FreeOptions = FreeOptions())
 
 
 def _stacked(
-    model: Model, data: Dataset, motion: SmoothMotion
+    model: Model, data: Dataset, motion: SmoothMotion, slow: float
 ) -> tuple[tuple[str, ...], FloatArray, Rows, FloatArray, FloatArray]:
     """Model rows, targets and usability on the motion's grid for all channels of the model."""
     grid, columns, known, targets, usable = motion.t_s, [], [], [], []
@@ -144,7 +147,9 @@ def _stacked(
         torque = nominal_torque(model, data)
         rows = model.drive_rows(motion.q, motion.qd, motion.qdd)
         speed_std = np.abs(model.robot.drive_matrix) @ motion.velocity_std
+        rubs = np.array([bool(joint.drive.friction) for joint in model.robot.joints])[:, None]
         lost = model.sign_unknown(motion.qd, speed_std)
+        lost |= (np.abs(drive_velocity(model.robot, motion.qd)) < slow) & rubs
         _add(data, "current", rows, motion.rate_hz, columns, known)
         targets.append(_on_grid(torque, grid))
         usable.append((motion.valid & _covered(torque, grid)) & ~lost)

@@ -88,7 +88,7 @@ def motion_warnings(robot: Robot, q: FloatArray, qd: FloatArray, qdd: FloatArray
 
 
 def _retraced_share(scaled: FloatArray) -> float:
-    """Share of the postures met again at another time of the run (a generic closed curve crosses itself rarely)."""
+    """Share of the postures met again the other way round; laps in the same direction do not count."""
     step = max(scaled.shape[1] // 400, 1)
     points = scaled[:, ::step]
     count = points.shape[1]
@@ -97,7 +97,8 @@ def _retraced_share(scaled: FloatArray) -> float:
     lag = np.minimum(lag, count - lag)
     stepwise = np.median(np.linalg.norm(np.diff(points, axis=1), axis=0))
     far_along = lag > 0.05 * count
-    close = distance < max(0.01, 1.5 * stepwise)
+    heading = np.gradient(points, axis=1)
+    close = (distance < max(0.01, 1.5 * stepwise)) & (heading.T @ heading < 0.0)
     # around the turning points neighbours in time are neighbours in space: leave them out
     return float((close & far_along).any(axis=1).mean() / 0.9)
 

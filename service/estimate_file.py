@@ -134,6 +134,7 @@ def estimate_content(
         "intervals_valid": fit.intervals_valid,
         "warnings": warnings,
         "rms": _rms(fit, validation[1] if validation else None),
+        "relative_error_percent": {key: _number(value) for key, value in fit.relative_error.items()},
         "condition_number": _number(fit.solution.condition_number),
         "method": _method(fit, estimator),
         "provenance": _provenance(recording, loaded, validation[0] if validation else None),

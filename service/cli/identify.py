@@ -24,6 +24,7 @@ def identify(
     decimate: Annotated[int | None, typer.Option(help="Non-periodic: keep every so many samples after filtering.", min=1)] = None,
     trim: Annotated[int, typer.Option(help="Non-periodic: samples to drop at either end.", min=0)] = 0,
     project: Annotated[bool, typer.Option("--project", help="Add the nearest physically consistent parameters.")] = False,
+    slow: Annotated[float, typer.Option(help="Non-periodic: leave out rows below this speed [rad/s, m/s].", min=0.0)] = 0.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the estimate as JSON.")] = False,
 ) -> None:
     """Identify parameters, torque constants and their covariance from a log.
@@ -41,7 +42,7 @@ def identify(
         kind=model,
         estimator=estimator,
         periodic=False if free else None,
-        free=FreeOptions(bandwidth, decimate, trim),
+        free=FreeOptions(bandwidth, decimate, trim, slow=slow),
         nominal_constants=nominal_constants,
     )
     found = identify_log(run, robot, options, validate, project=project)
@@ -106,6 +107,9 @@ def _print_fit(out: Console, content: dict[str, Any]) -> None:
     ]
     out.print(table("Fit (N.m, N)", ("channel", "noise/sample", "rms, averaged", "noise, averaged", "rms, validation"), rows))
     test = content["lack_of_fit"]
+    if not content["method"]["periodic"]:
+        errors = ", ".join(f"{channel} {value:.2f} %" for channel, value in content["relative_error_percent"].items())
+        out.print(f"Relative error: {errors}.", markup=False)
     if test["p"] is None:
         out.print(f"Lack of fit: not tested ({test['reason']}).", markup=False)
     else:
