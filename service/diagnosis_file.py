@@ -9,6 +9,7 @@ from daq.recording import Recording
 from identify.diagnosis.findings import Diagnosis, Finding
 from identify.fit import Fit
 from service.augmented_file import augmented_content
+from service.diagnosis_plots import curve_entries, map_entries
 from service.robots import LoadedRobot
 
 SCHEMA_VERSION = 1
@@ -95,6 +96,8 @@ def diagnosis_content(diagnosis: Diagnosis, fit: Fit, loaded: LoadedRobot, recor
         "blind_spots": _blind_spots(diagnosis),
         "fit": _fit_tables(diagnosis),
         "next_experiment": diagnosis.next_experiment,
+        "curves": curve_entries(diagnosis),
+        "map": map_entries(diagnosis),
         "estimate": augmented_content(diagnosis, fit, loaded, recordings[0]),
         "location": {
             "internal_p": _number(location.internal_p),
