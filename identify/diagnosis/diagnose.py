@@ -19,7 +19,7 @@ from identify.diagnosis.findings import ChannelFit, Diagnosis, Finding, FoundPar
 from identify.diagnosis.held_out import held_out
 from identify.diagnosis.locate import locate
 from identify.diagnosis.problem import Problem, build_problem
-from identify.diagnosis.select import Named, Selection, backward, extend, select, tangent_columns
+from identify.diagnosis.select import Named, Selection, backward, extend, rebased, select
 from identify.fit import Fit
 from identify.physics.catalogue import catalogue
 from identify.physics.effect import Effect
@@ -142,19 +142,15 @@ def _with_progress(problem: Problem, progress: list[tuple[Progress, tuple[str, .
 
 
 def _gate(problem: Problem, selection: Selection, options: DiagnoseOptions) -> tuple[Selection, Adequacy]:
-    """Take back names that leave too much on their own channels; examine what is left."""
+    """Take back names that leave too much on their own channels, and those that then no longer stand out."""
     level = LEVEL_REST * options.level
     rest = examine(problem, selection.basis, selection.residual)
-    kept = [item for item in selection.named if not _leaves_too_much(problem, item, rest, level)]
-    if len(kept) == len(selection.named):
-        return selection, rest
-    basis = problem.basis
-    for item in kept:
-        columns = problem.columns(item.trial.effect, item.trial.place, item.trial.shape)
-        basis = extend(basis, np.hstack([columns, tangent_columns(problem, item.trial)]))
-    residual = problem.residual - basis @ (basis.T @ problem.residual)
-    selection = Selection(tuple(kept), basis, residual, selection.null, selection.first)
-    return selection, examine(problem, basis, residual)
+    while True:
+        kept = [item for item in selection.named if not _leaves_too_much(problem, item, rest, level)]
+        if len(kept) == len(selection.named):
+            return selection, rest
+        selection = backward(problem, rebased(problem, selection, kept), LEVEL_NAMED * options.level)
+        rest = examine(problem, selection.basis, selection.residual)
 
 
 def _leaves_too_much(problem: Problem, item: Named, rest: Adequacy, level: float) -> bool:

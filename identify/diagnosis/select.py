@@ -145,8 +145,27 @@ def cosine(first: Trial, second: Trial) -> float:
     return float(np.linalg.svd(first.basis.T @ second.basis, compute_uv=False)[0])
 
 
+def rebased(problem: Problem, selection: Selection, named: list[Named]) -> Selection:
+    """The selection with other effects in it: their columns and tangents join the baseline.
+
+    Args:
+        problem: the problem.
+        selection: where the null and the first trials come from.
+        named: the effects it is to hold.
+
+    Returns:
+        The selection with its basis and residual formed anew.
+    """
+    basis = problem.basis
+    for item in named:
+        columns = problem.columns(item.trial.effect, item.trial.place, item.trial.shape)
+        basis = extend(basis, np.hstack([columns, tangent_columns(problem, item.trial)]))
+    residual = problem.residual - basis @ (basis.T @ problem.residual)
+    return Selection(tuple(named), basis, residual, selection.null, selection.first)
+
+
 def backward(problem: Problem, selection: Selection, level: float) -> Selection:
-    """Drop effects that the later ones made superfluous, refitting the rest jointly.
+    """Drop effects that the others make superfluous, refitting the rest jointly.
 
     Args:
         problem: the problem.
@@ -157,7 +176,7 @@ def backward(problem: Problem, selection: Selection, level: float) -> Selection:
         The pruned selection, with every effect refitted in the presence of the others.
     """
     named = list(selection.named)
-    while len(named) > 1:
+    while named:
         refitted = [_in_presence(problem, named, k) for k in range(len(named))]
         p_values = [selection.null.p_value(item.log_p) if item else 1.0 for item in refitted]
         worst = int(np.argmax(p_values))
@@ -167,12 +186,7 @@ def backward(problem: Problem, selection: Selection, level: float) -> Selection:
             ]
             break
         named.pop(worst)
-    basis = problem.basis
-    for item in named:
-        columns = problem.columns(item.trial.effect, item.trial.place, item.trial.shape)
-        basis = extend(basis, np.hstack([columns, tangent_columns(problem, item.trial)]))
-    residual = problem.residual - basis @ (basis.T @ problem.residual)
-    return Selection(tuple(named), basis, residual, selection.null, selection.first)
+    return rebased(problem, selection, named)
 
 
 def _in_presence(problem: Problem, named: list[Named], index: int) -> Trial | None:
