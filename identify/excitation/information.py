@@ -11,6 +11,7 @@ from identify.base_parameters import independent_columns
 from identify.excitation.errors import DesignError
 from identify.excitation.limits import MotionLimits
 from identify.excitation.reference import ReferenceModel
+from identify.excitation.stacked_rows import stacked_rows
 from identify.friction import drive_velocity
 from identify.model import Model
 from identify.rotations import FloatArray
@@ -179,15 +180,13 @@ class InformationModel:
         """Evaluate whitened columns of all parameters and constants, each instant by itself, and the torques."""
         model, theta = self.model, self.reference.theta
         sign = np.tanh(drive_velocity(model.robot, qd) / self.smooth_speed[:, None]) if smooth else None
-        drives = model.drive_rows(q, qd, qdd, sign)
-        torque = np.tensordot(theta, drives.columns, axes=([0], [1])) + drives.known
-        parts = [drives.columns]
-        if model.kind == "combined":
-            parts.append(model.wrench_rows(q, qd, qdd).columns)
-        columns = np.concatenate(parts)
+        columns, known = stacked_rows(model, q, qd, qdd, sign)
+        torque = np.einsum("cpn,p->cn", columns[: model.robot.n], theta) + known[: model.robot.n]
         scales = np.zeros((len(columns), len(self.free_scales), q.shape[1]))
         scales[self.free_scales, np.arange(len(self.free_scales))] = torque[self.free_scales]
-        return np.concatenate([columns, scales], axis=1) / self.noise.std[:, None, None], torque
+        together = np.concatenate([columns, scales], axis=1)
+        together /= self.noise.std[:, None, None]
+        return together, torque
 
     def differentiate(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray
@@ -210,7 +209,9 @@ class InformationModel:
         moved[np.arange(3 * n), np.arange(1, 3 * n + 1)] += _STEP
         flat = moved.reshape(3 * n, -1)
         columns, torque = self.baseline_columns(flat[:n], flat[n : 2 * n], flat[2 * n :], smooth=True)
-        columns = columns[:, self.kept].reshape(len(columns), len(self.kept), 3 * n + 1, count)
+        if len(self.kept) < columns.shape[1]:
+            columns = columns[:, self.kept]
+        columns = columns.reshape(len(columns), len(self.kept), 3 * n + 1, count)
         torque = torque.reshape(n, 3 * n + 1, count)
         here = Sampled(
             np.concatenate([columns[:, :, 0], self.whitened_effects(q, qd, qdd)], axis=1), torque[:, 0]

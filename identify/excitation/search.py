@@ -17,7 +17,7 @@ from identify.rotations import FloatArray
 _DRAWS = 24  # random motions a start: the best of them is optimised
 # sharpness of the smooth maxima, stiffness of the penalties and iterations, stage by stage
 _EXPLORE = ((25.0, 10.0, 30),)
-_REFINE = ((60.0, 100.0, 30), (200.0, 1e3, 40), (800.0, 1e4, 40))
+_REFINE = ((50.0, 100.0, 60), (400.0, 1e4, 60))
 _SHRINK_STEPS = 30
 _LEAST_SIZE = 0.02  # share of the size below which a constraint counts as unreachable
 

@@ -24,7 +24,7 @@ def design(
         list[str] | None, typer.Option(help="NAME:JOINT to reveal or tell apart; repeat.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
-    starts: Annotated[int, typer.Option(help="Number of random starts.")] = 8,
+    starts: Annotated[int, typer.Option(help="Number of random starts.")] = 6,
     share: Annotated[float, typer.Option(help="Part of every joint limit that may be used.")] = 0.99,
     workspace: Annotated[Path | None, typer.Option(help="Obstacles and bodies, a TOML file.")] = None,
     noise_from: Annotated[Path | None, typer.Option(help="Estimate whose noise levels to expect.")] = None,

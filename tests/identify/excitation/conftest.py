@@ -1,0 +1,56 @@
+"""Small robots whose designs take a fraction of a second."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.excitation.design import DesignOptions, prepare
+from identify.excitation.series import FourierSeries
+from identify.robot import Drive, ForcePlate, Joint, Limits, Robot
+
+
+def joint(name, xyz, axis, limits, **drive):
+    return Joint(name, f"link_{name}", False, np.eye(3), np.array(xyz), np.array(axis), limits, Drive(**drive))
+
+
+@pytest.fixture
+def two_axes():
+    """A turntable with a shoulder on a tared plate."""
+    return Robot(
+        "two",
+        (
+            joint("yaw", (0, 0, 0.5), (0, 0, 1.0), Limits(-1.5, 1.5, 1.2, 5.0, 200.0), torque_constant=0.2, gear_ratio=100.0),
+            joint("pitch", (0, 0, 0.1), (0, 1.0, 0), Limits(-0.8, 1.0, 1.0, 4.0, 300.0), torque_constant=0.2, gear_ratio=90.0),
+        ),
+        plate=ForcePlate(),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def with_limits():
+    """Replace the limits of one joint."""
+
+    def change(robot, index, **limits):
+        joints = list(robot.joints)
+        joints[index] = replace(joints[index], limits=replace(joints[index].limits, **limits))
+        return replace(robot, joints=tuple(joints))
+
+    return change
+
+
+@pytest.fixture
+def problem(two_axes):
+    return prepare(two_axes, DesignOptions(harmonics=3, fundamental_hz=0.2))
+
+
+@pytest.fixture
+def quick():
+    """Options of a small search."""
+    return DesignOptions(harmonics=3, fundamental_hz=0.2, starts=2, refined=1)
+
+
+@pytest.fixture
+def random_series():
+    rng = np.random.default_rng(11)
+    return FourierSeries(0.1, rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=(3, 4)))
