@@ -11,6 +11,7 @@ from importlib.metadata import version
 # command -> (module, first line of its help); modules are imported only when their command is used
 COMMANDS: Mapping[str, tuple[str, str]] = {
     "demo": ("demo", "The whole story on the virtual robot, no hardware needed."),
+    "design": ("design", "The periodic excitation that tells most about a robot, inside its limits."),
     "inspect": ("inspect", "What is in a log, and whether it is fit for use."),
     "identify": ("identify", "Parameters, torque constants and covariance from a log."),
     "diagnose": ("diagnose", "The physics a model lacks: where, which, how much, and the proof."),
