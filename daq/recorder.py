@@ -138,7 +138,7 @@ class Recorder:
 
     def _flush_if_due(self) -> None:
         now_s = time.monotonic()
-        if self._dirty and now_s - self._flushed_s >= _FLUSH_S:
+        if self._dirty and not self._patient and now_s - self._flushed_s >= _FLUSH_S:
             self._flush(now_s)
 
     def _flush(self, now_s: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -134,13 +135,36 @@ def plan_validation(
     return Plan(limits.joints, period_s, q, qd, qdd, 0, len(q), "validation")
 
 
+def plan_motion(
+    limits: Limits, start: np.ndarray, period_s: float, motion: Callable[[np.ndarray], Motion],
+    duration_s: float, kind: str,
+) -> Plan:
+    """A given motion, from rest to rest, with the way to its first pose and back.
+
+    Args:
+        limits: what must be kept.
+        start: (k,) where the arm stands.
+        period_s: bus period.
+        motion: instants (n,) to q, qd, qdd (n, k).
+        duration_s: of the motion.
+        kind: ``validation`` or ``free``.
+    """
+    middle = _sample(motion, duration_s, period_s)
+    begin, end = (_rest(pose, period_s) for pose in (middle[0][0], middle[0][-1]))
+    approach = _approach(limits, start, begin[0][0], period_s)
+    home = _approach(limits, end[0][0], start, period_s)
+    q, qd, qdd = _join([approach, begin, middle, end, home])
+    first = len(approach[0]) + len(begin[0])
+    return Plan(limits.joints, period_s, q, qd, qdd, first, first + len(middle[0]), kind)
+
+
 def _align_ramp(ramp: Ramp, orbit: Excitation, period_s: float) -> Motion:
     """The ramp in, sampled so that the orbit's phase zero falls on the next cycle."""
     count = int(np.ceil(ramp.duration_s / period_s))
     return ramp.into(orbit, ramp.duration_s - period_s * np.arange(count, 0, -1))
 
 
-def _sample(evaluate, duration_s: float, period_s: float) -> Motion:  # noqa: ANN001 - t -> Motion
+def _sample(evaluate: Callable[[np.ndarray], Motion], duration_s: float, period_s: float) -> Motion:
     return evaluate(np.arange(int(np.ceil(duration_s / period_s)) + 1) * period_s)
 
 

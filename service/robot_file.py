@@ -54,12 +54,51 @@ class Filters(_Section):
     wrench: StreamFilter | None = None
 
 
+class PlateConnection(_Section):
+    """How the plate is read: its protocol, its serial port, how the sensor sits under the robot.
+
+    ``rotation`` turns sensor axes into plate axes, row by row; ``is_action`` where the sensor reports what
+    the robot does to it.
+    """
+
+    protocol: Annotated[str, Field(min_length=1)] = "bota"
+    port: Annotated[str, Field(min_length=1)]
+    settings: dict[str, float | int | tuple[float, ...]] = Field(default_factory=dict)
+    rotation: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    is_action: bool = False
+
+
+class BusSection(_Section):
+    """The CAN bus of the drives; the same keys as in the drivers' own configuration."""
+
+    interface: str = "socketcan"
+    channel: str = "can0"
+    bitrate_hz: Annotated[int, Field(ge=10_000, le=1_000_000)] = 1_000_000
+    own_echo: bool = True
+    kernel_sync: bool = False
+    options: dict[str, str | int | float | bool] = Field(default_factory=dict)
+    rate_hz: Positive | None = None
+    host_node: Annotated[int, Field(ge=1, le=127)] = 127
+    heartbeat_ms: Annotated[int, Field(ge=5, le=10_000)] = 50
+    heartbeat_patience: Annotated[float, Field(ge=1.5, le=20.0)] = 3.0
+    missing_in_row: Annotated[int, Field(ge=1, le=100)] = 3
+    deadlines: dict[str, Positive] = Field(default_factory=dict)
+
+
+class LimitsSection(_Section):
+    """What stops a run when measured [rad or m]: distance from the set points, excess over the limits."""
+
+    following_error: Positive = 0.1
+    envelope: NotNegative = 0.02
+
+
 class PlateSection(_Section):
     """Pose of the force plate in the base frame."""
 
     xyz: Vector3 = (0.0, 0.0, 0.0)
     rpy: Vector3 = (0.0, 0.0, 0.0)
     tared: bool = True
+    connection: PlateConnection | None = None
 
 
 class JointSection(_Section):
@@ -75,11 +114,17 @@ class JointSection(_Section):
     offset: bool = True
     gravity_compensation: GravityCompensation | None = None
     max_acceleration: Positive | None = None
+    node: Annotated[int, Field(ge=1, le=126)] | None = None
+    direction: Annotated[int, Field(ge=-1, le=1)] = 1
+    drive_profile: str = "generic"
+    drive_serial: Annotated[int, Field(ge=0, le=0xFFFFFFFF)] | None = None
 
     @model_validator(mode="after")
     def _geared(self) -> JointSection:
         if self.gear_ratio == 0:
             raise ValueError("gear_ratio must not be zero")
+        if self.direction == 0:
+            raise ValueError("direction must be 1 or -1")
         if self.torque_constant == 0:
             raise ValueError("torque_constant must not be zero; leave it out where it is unknown")
         if len(set(self.friction)) != len(self.friction):
@@ -97,6 +142,8 @@ class RobotFile(_Section):
     force_plate: PlateSection | None = None
     coupling: tuple[tuple[float, ...], ...] | None = None
     filter: Filters = Filters()
+    bus: BusSection | None = None
+    limits: LimitsSection = LimitsSection()
     noise: dict[str, Positive] = Field(default_factory=dict)
     joint: Annotated[tuple[JointSection, ...], Field(min_length=1)]
 
