@@ -12,6 +12,7 @@ from importlib.metadata import version
 COMMANDS: Mapping[str, tuple[str, str]] = {
     "demo": ("demo", "The whole story on the virtual robot, no hardware needed."),
     "design": ("design", "The periodic excitation that tells most about a robot, inside its limits."),
+    "record": ("record", "A run on the drives and the plate, or on the virtual robot."),
     "inspect": ("inspect", "What is in a log, and whether it is fit for use."),
     "identify": ("identify", "Parameters, torque constants and covariance from a log."),
     "diagnose": ("diagnose", "The physics a model lacks: where, which, how much, and the proof."),
