@@ -16,6 +16,7 @@ def diagnose(
     robot: Annotated[str | None, typer.Option(help="Preset name or path of a robot.toml; the log's own when left out.")] = None,
     validate: Annotated[Path | None, typer.Option(help="A recording that is not used in the fit, to show the gain on.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Where to write the diagnosis (JSON).")] = None,
+    report: Annotated[Path | None, typer.Option(help="Where to write the report for people (one HTML page that prints).")] = None,
     model: Annotated[str | None, typer.Option(help="combined, internal or external; the richest the log allows when left out.")] = None,
     free: Annotated[bool, typer.Option("--free", help="Treat the run as non-periodic.")] = False,
     bandwidth: Annotated[float | None, typer.Option(help="Non-periodic: cut-off of the differentiating filter [Hz].")] = None,
@@ -34,16 +35,23 @@ def diagnose(
     from service.files import check_writable, to_json, write_text
 
     check_writable(output, "the diagnosis")
+    check_writable(report, "the report")
     options = FitOptions(kind=model, periodic=False if free else None, free=FreeOptions(bandwidth, decimate, trim))
     found = diagnose_log(run, robot, validate, options)
     if output is not None:
         write_text(output, to_json(found.content), "the diagnosis")
+    if report is not None:
+        from service.report.page import report_html
+
+        write_text(report, report_html(found.content), "the report")
     if as_json:
         print_json(found.content)
         return
     print_diagnosis(console(), found.content)
     if output is not None:
         console().print(f"\nWritten to {output}.")
+    if report is not None:
+        console().print(f"Report for people: {report}.")
 
 
 def print_diagnosis(out: Console, content: dict[str, Any]) -> None:

@@ -1,0 +1,1 @@
+"""The printed report of a diagnosis: one HTML page, nothing loaded from outside."""
