@@ -12,7 +12,7 @@ from identify.physics.loose_links import links_along
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
 
-_LONG = 20.0  # a crossing is over (1e-6 of it left) after this many times 1 / (2 pi f)
+_LONG = 20.0  # a crossing is over (3e-6 of it left) after this many times 1 / (2 pi f)
 
 
 def _edges(scene: Scene, joint: int) -> tuple[FloatArray, FloatArray]:
@@ -28,10 +28,11 @@ def _edges(scene: Scene, joint: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _crossing(elapsed: FloatArray, rate: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Smooth unit step of three equal lags, with its first and second rates."""
-    x = np.clip(elapsed * rate, 0.0, 50.0)
+    """Smooth unit step of four equal lags (no jump of the jerk), with its first and second rates."""
+    x = elapsed * rate
     fade = np.exp(-x)
-    return 1.0 - fade * (1.0 + x + 0.5 * x**2), 0.5 * rate * x**2 * fade, rate**2 * (x - 0.5 * x**2) * fade
+    rise = 1.0 - fade * (1.0 + x + x**2 / 2.0 + x**3 / 6.0)
+    return rise, rate * x**3 / 6.0 * fade, rate**2 * (x**2 / 2.0 - x**3 / 6.0) * fade
 
 
 def _side(scene: Scene, joint: int, crossing_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -11,6 +11,9 @@ from identify.physics.effect import Coefficient, Effect, Place, Shape, only_join
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
 
+# instants of samples are known no better than this; it also lets the estimate move smoothly past a sample
+_BLUR_S = 1e-4
+
 
 def _late(scene: Scene, series: FloatArray, delay_s: float) -> FloatArray:
     """A smooth series as it was a delay earlier, shape (B,)."""
@@ -26,7 +29,10 @@ def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArr
     joint, lag = place.joint, shape["lag"]
     coulomb = fitted(scene, joint, "coulomb")
     smooth = scene.torque[joint] - coulomb * scene.direction[joint]
-    before = _late(scene, smooth, lag) + coulomb * np.sign(_late(scene, scene.speed[joint], lag))
+    speed, pull = scene.speed[joint], scene.robot.drive_matrix[joint] @ scene.qdd
+    turning = np.abs(_late(scene, pull, lag)) * _BLUR_S + 1e-12
+    side = np.clip(_late(scene, speed, lag) / turning, -1.0, 1.0)
+    before = _late(scene, smooth, lag) + coulomb * side
     return only_joint(scene, joint, (before - scene.torque[joint]) / lag)
 
 

@@ -35,6 +35,7 @@ class Scene:
         qdd: accelerations, shape (n, B).
         periodic: whether the grid is one period of a repeating motion.
         has_wrench: whether the base wrench was measured and is modelled.
+        found: drive torques [N.m or N] of effects that have joined the model, shape (n, B); None for none.
     """
 
     model: Model
@@ -46,6 +47,7 @@ class Scene:
     qdd: FloatArray
     periodic: bool
     has_wrench: bool
+    found: FloatArray | None = None
 
     @property
     def robot(self) -> Robot:
@@ -99,20 +101,26 @@ class Scene:
 
     @cached_property
     def current_a(self) -> FloatArray:
-        """Fitted motor currents [A]; drive torques where no torque constant is known, shape (n, B)."""
+        """Fitted motor currents [A], with the effects found so far; torques where no constant is known; (n, B)."""
         factors = np.array([j.drive.gear_ratio * (j.drive.torque_constant or 1.0) for j in self.robot.joints])
-        return self.torque * (self.scale / factors)[:, None]
+        torque = self.torque if self.found is None else self.torque + self.found
+        return torque * (self.scale / factors)[:, None]
 
     @cached_property
     def load(self) -> FloatArray:
         """Rigid-body torque of the links on every drive, without friction, offset and rotor, shape (n, B).
 
         With the plate the links' gravity is known apart from a compensation spring and stands here whole; without
-        it gravity and spring cannot be told apart and their sum stands here.
+        it gravity and spring cannot be told apart and their sum stands here, with the offset: over a limited
+        travel large amounts of offset and of the compensation's cosines cancel, and neither is known alone.
         """
         basis, count = self.model.basis, len(self.model.basis.columns)
         if self.model.kind != "combined":
-            keep = np.array([p.group in ("inertial", "gravity_compensation") for p in self.model.parameters])
+            groups = ("inertial", "gravity_compensation")
+            sprung = {joint.name for joint in self.robot.joints if joint.drive.gravity_harmonics}
+            keep = np.array(
+                [p.group in groups or (p.group == "offset" and p.joint in sprung) for p in self.model.parameters]
+            )
             rows = self.model.drive_rows(self.q, self.qd, self.qdd)
             return np.tensordot(rows.columns[:, keep], self.theta[keep], axes=([1], [0]))
         links = to_drives(self.robot, rigid_columns(self.robot, self.q, self.qd, self.qdd, external=False).internal)

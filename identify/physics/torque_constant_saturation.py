@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from identify.physics.drives import current_drives
+from identify.physics.drives import current_drives, torque_per_ampere
 from identify.physics.effect import Coefficient, Effect, Place, only_joint
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
@@ -14,7 +14,7 @@ from identify.rotations import FloatArray
 
 def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArray:
     joint = place.joint
-    return only_joint(scene, joint, scene.current_a[joint] ** 2 * scene.torque[joint])
+    return only_joint(scene, joint, torque_per_ampere(scene, joint) * scene.current_a[joint] ** 3)
 
 
 def _still_rises(scene: Scene, place: Place, values: FloatArray, shape: Mapping[str, float]) -> bool:
