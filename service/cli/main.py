@@ -18,6 +18,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "diagnose": ("diagnose", "The physics a model lacks: where, which, how much, and the proof."),
     "simulate": ("simulate", "What a model says a recording's sensors would have shown, as a log."),
     "export": ("export", "An estimate as URDF and MJCF."),
+    "prove": ("prove", "Blind trials of the diagnosis on concealed effects."),
     "import": ("import_", "A foreign recording (csv, npz, db3, mcap) as a log."),
     "recover": ("recover", "A broken log's intact part as a valid log."),
 }
