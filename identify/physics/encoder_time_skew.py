@@ -12,32 +12,43 @@ from identify.physics.responses import delayed
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
 
+# dense, because which samples lie between a true and a read reversal changes every tenth of a millisecond
+_LATE_S = (1e-4, 2e-4, 3.5e-4, *(float(x) for x in np.arange(5e-4, 6.6e-3, 2.5e-4)), 8e-3)
+_EARLY_S = (-8e-3, -4e-3, -2e-3, -1e-3, -5e-4, -2e-4)
+
+
+def _coulomb(scene: Scene) -> FloatArray:
+    return np.array([fitted(scene, k, "coulomb") for k in range(scene.robot.n)])
+
 
 def _steps(scene: Scene, speed: FloatArray) -> FloatArray:
     """Coulomb torque of all drives in the directions of given speeds (n, B), no wrench; shape (rows, B)."""
-    coulomb = np.array([fitted(scene, k, "coulomb") for k in range(scene.robot.n)])
-    steps = coulomb[:, None] * np.sign(speed)
+    steps = _coulomb(scene)[:, None] * np.sign(speed)
     return np.concatenate([steps, np.zeros((scene.rows - scene.robot.n, speed.shape[1]))])
 
 
 def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArray:
-    """Difference to all rows one lag ahead; friction's steps move by it and are not smeared over samples."""
-    late = shape["late"] if abs(shape["late"]) > 1e-6 else 1e-6
+    """Rate of the smooth rows, and the samples between a true and a read reversal, whose friction is turned."""
     now = _steps(scene, scene.speed)
-    ahead = delayed(scene, scene.prediction - now, -late) + _steps(scene, delayed(scene, scene.speed, -late))
-    return ((ahead - scene.prediction) / late)[:, None]
+    turned = _steps(scene, delayed(scene, scene.speed, -shape["late"])) - now
+    return np.stack([scene.ddt(scene.prediction - now), turned], axis=1)
+
+
+def _agrees(scene: Scene, place: Place, values: FloatArray, shape: Mapping[str, float]) -> bool:
+    """Friction must turn by about its whole self, and the smooth rows not move the other way."""
+    turns = 0.3 < values[1] < 1.7 or not _coulomb(scene).any()
+    return bool(turns and -0.5 < values[0] / (shape["late"] or 1e-6) < 4.0)
 
 
 EFFECT = Effect(
     name="encoder_time_skew",
     where="S",
     parity="O",
-    coefficients=(Coefficient("T", "s"),),
+    coefficients=(Coefficient("T", "s"), Coefficient("turned", "1", +1)),
     columns=_columns,
     places=whole_robot,
-    sentence="The encoders' samples lag drives and plate alike by {T}.",
+    sentence="The encoders' samples lag drives and plate alike by {T} (by {late} where friction turns).",
     reference="reading(t) = q(t - T): all rows are those of the reading T later; one T for drives and plate",
-    shapes=(Shape("late", "s", (-8e-3, -2e-3, -5e-4, 5e-4, 2e-3, 8e-3)),),
-    # the size must agree with the shift that shapes the pulses at friction's steps, else it is no skew
-    constraint=lambda scene, place, values, shape: bool(0.4 < values[0] / (shape["late"] or np.inf) < 2.5),
+    shapes=(Shape("late", "s", (*_EARLY_S, *_LATE_S)),),
+    constraint=_agrees,
 )

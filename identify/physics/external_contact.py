@@ -38,8 +38,8 @@ EFFECT = Effect(
     ),
     reference="one-sided push of one direction, local in a joint's position; drives (J'f) and plate (X f)",
     shapes=(
-        Shape("centre", "of the travel", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)),
-        Shape("width", "rad", (0.08, 0.3)),
+        Shape("centre", "of the travel", (0.02, 0.14, 0.26, 0.38, 0.5, 0.62, 0.74, 0.86, 0.98)),
+        Shape("width", "rad", (0.06, 0.2)),
         Shape("reach", "m", (0.1, 0.5)),
     ),
 )

@@ -6,46 +6,47 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from identify.physics.crank import rod
 from identify.physics.drives import revolute_drives
 from identify.physics.effect import Coefficient, Effect, Place, Shape, only_joint
 from identify.physics.responses import lagging
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
 
+_ADIABATIC = 1.4  # two-atomic gases
+# length of the gas at rest over the crank's hypotenuse: strokes take up to half of it
+_GAS_LENGTH = 0.6
+
 
 def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArray:
-    q = scene.q[place.joint]
-    pushed_in = 1.0 - np.cos(q - shape["phi"])
-    loop = np.sin(q - shape["phi"]) * (pushed_in - lagging(scene, pushed_in, shape["heat_time"]))
-    waves = [np.cos(q), np.sin(q), np.cos(2.0 * q), np.sin(2.0 * q)]
-    return only_joint(scene, place.joint, np.stack([loop, *waves]))
+    """Gas at the wall's temperature, then what its own temperature adds, which fades with its heat."""
+    stroke, lever = rod(scene.q[place.joint] - shape["phi"])
+    compression = -np.log(1.0 - stroke / _GAS_LENGTH)
+    slow = lever * np.exp(compression)
+    warmth = (_ADIABATIC - 1.0) * (compression - lagging(scene, compression, shape["heat_time"]))
+    return only_joint(scene, place.joint, np.stack([slow * np.exp(warmth), lever]))
 
 
 EFFECT = Effect(
     name="gas_balancer",
     where="I",
     parity="X",
-    coefficients=(
-        Coefficient("loop", "N.m", +1),
-        Coefficient("cos_1", "N.m"),
-        Coefficient("sin_1", "N.m"),
-        Coefficient("cos_2", "N.m"),
-        Coefficient("sin_2", "N.m"),
-    ),
+    # gas pressure, and the pressure of the air outside with a parallel spring's, of either sign
+    coefficients=(Coefficient("pressure", "N.m", +1), Coefficient("constant", "N.m")),
     columns=_columns,
     places=revolute_drives,
     sentence=(
-        "{place} is balanced by a gas spring: its force lags the stroke ({loop} that fades with the gas's "
-        "heat in {heat_time}), on a spring of {sin_1} in the sine and {cos_1} in the cosine of its angle."
+        "{place} is balanced by a gas spring with its dead centre at {phi}: {pressure} at rest and {constant} from the "
+        "air outside, lagging the stroke as its gas warms and cools within {heat_time}."
     ),
     reference=(
-        "p0 (V0/(V0 - A x))^n A: n = 1 when slow, 1.4 when fast; the difference, high-passed by the gas's "
-        "heat exchange, is a passive loop"
+        "p0 (V0/(V0 - A x))^n A: n = 1 when slow, 1.4 when fast; between them the heat exchange makes a "
+        "passive loop"
     ),
     shapes=(
-        Shape("heat_time", "s", (0.2, 0.6, 2.0, 6.0, 20.0)),
-        Shape("phi", "rad", (-0.8, 0.0, 0.8)),
+        Shape("heat_time", "s", (0.4, 1.2, 2.5, 6.0, 15.0)),
+        Shape("phi", "rad", (-2.0, -1.0, 0.0, 1.0, 2.0, 3.14)),
     ),
-    # without a loop it is a plain spring
+    # without gas it is a plain spring
     constraint=lambda scene, place, values, shape: bool(values[0] > 0.0),
 )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from identify.physics.crank import rod
 from identify.physics.drives import revolute_drives
 from identify.physics.effect import Coefficient, Effect, Place, Shape, only_joint
 from identify.physics.scene import Scene
@@ -13,10 +14,9 @@ from identify.rotations import FloatArray
 
 
 def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArray:
-    q = scene.q[place.joint]
-    second = 1.0 if shape["harmonics"] > 1.5 else 0.0
-    waves = np.stack([np.cos(q), np.sin(q), second * np.cos(2.0 * q), second * np.sin(2.0 * q)])
-    return only_joint(scene, place.joint, waves)
+    turned = scene.q[place.joint] - shape["phi"]
+    stretch, lever = rod(turned)
+    return only_joint(scene, place.joint, np.stack([lever, lever * stretch]))
 
 
 def _places(scene: Scene) -> list[Place]:
@@ -29,18 +29,14 @@ EFFECT = Effect(
     name="gravity_compensation_spring",
     where="I",
     parity="E",
-    coefficients=(
-        Coefficient("cos_1", "N.m"),
-        Coefficient("sin_1", "N.m"),
-        Coefficient("cos_2", "N.m"),
-        Coefficient("sin_2", "N.m"),
-    ),
+    # the spring tightened in its shortest place, and tightening by its stiffness: k > 0, no push
+    coefficients=(Coefficient("preload", "N.m", +1), Coefficient("stiffness", "N.m", +1)),
     columns=_columns,
     places=_places,
     sentence=(
-        "{place} is balanced by a spring that the robot file does not state: {sin_1} in the sine and {cos_1} "
-        "in the cosine of its angle ({sin_2} and {cos_2} in those of twice its angle)."
+        "{place} is balanced by a spring that the robot file does not state, with its dead centre at {phi}: {preload} "
+        "from its preload and {stiffness} from its stretch, at the length of its crank's hypotenuse."
     ),
-    reference="k A B sin(q - phi) (1 - l0 / l), expanded in the joint's angle; conservative, inside the arm",
-    shapes=(Shape("harmonics", "1", (1.0, 2.0), continuous=False),),
+    reference="k A B sin(q - phi) (1 - l0/l) = k A B sin(q - phi)/l ((l_min - l0) + (l - l_min))",
+    shapes=(Shape("phi", "rad", (-2.7, -1.8, -0.9, 0.0, 0.9, 1.8, 2.7, 3.6)),),
 )

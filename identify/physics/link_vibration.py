@@ -31,5 +31,7 @@ EFFECT = Effect(
     places=every_drive,
     sentence="{place}'s link swings at {f0} after every acceleration (share {share}, damping {damping}).",
     reference="x'' + 2 z w x' + w^2 x = -share qdd; link = motor + x",
+    # a link takes part in its joint's acceleration once at most; the rest is room for noise
+    constraint=lambda scene, place, values, shape: bool(values[0] < 2.0),
     shapes=(Shape("f0", "Hz", (8.0, 11.0, 15.0, 20.0, 28.0, 40.0)), Shape("damping", "1", (0.02, 0.15))),
 )
