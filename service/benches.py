@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +36,8 @@ class Bench:
     plate: Plate | None
     clock: Clock
     is_virtual: bool
+    foresee: Callable[[np.ndarray], None] = lambda targets_rad: None
+    """Tell a simulation the set points (n, k) to come."""
 
 
 def limits_for(loaded: LoadedRobot) -> Limits:
@@ -158,7 +160,7 @@ def virtual_bench(
     from drivers.virtual.bench import open_bench
 
     made = open_bench(plant_for(loaded), rate_hz, seed, effects, start_q)
-    return Bench(made.drives, made.plate, made.clock, is_virtual=True)
+    return Bench(made.drives, made.plate, made.clock, is_virtual=True, foresee=made.drives.foresee)
 
 
 def parse_effect(text: str) -> EffectSpec:

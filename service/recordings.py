@@ -184,12 +184,23 @@ def open_session(request: RecordRequest, listeners: Sequence[Callable[[Change], 
     _check_output(request.output)
     bench = _bench(request, loaded, rate_hz)
     job = Job(
-        path=request.output, plan=motion.plan, limits=limits, metadata=_metadata(request, loaded),
+        path=request.output, plan=_foreseen(motion.plan, bench), limits=limits, metadata=_metadata(request, loaded),
         attachments=_attachments(loaded, motion), patient=bench.is_virtual and not request.is_real_time,
         checks=lambda: _checks(bench),
     )
     acquisition = Acquisition(job, bench.drives, bench.clock, bench.plate, RunStatus(*listeners))
     return Session(request, loaded, limits, motion, rate_hz, bench, acquisition)
+
+
+def _foreseen(planner: Planner, bench: Bench) -> Planner:
+    """The planner, which also tells a simulated bench what is coming."""
+
+    def plan(start: np.ndarray, period_s: float) -> Plan:
+        made = planner(start, period_s)
+        bench.foresee(made.q)
+        return made
+
+    return plan
 
 
 def preview(request: RecordRequest, start: np.ndarray | None = None) -> tuple[Plan, DryRun]:

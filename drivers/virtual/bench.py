@@ -13,13 +13,13 @@ from drivers.canopen.fake.contents import DriveData
 from drivers.canopen.fake.dictionary import key
 from drivers.canopen.fake.faults import FaultPlan
 from drivers.canopen.fake.fleet import Fleet
-from drivers.canopen.fake.robot_plant import RobotPlant
 from drivers.canopen.fake.segment import SimulatedSegment
 from drivers.canopen.profile import common_period_us, load_profile
 from drivers.canopen.sample import CycleSample
 from drivers.force_plate.faults import Fault as PlateFault
 from drivers.virtual.effects.effect import EffectSpec
 from drivers.virtual.effects.scales import noise_a
+from drivers.virtual.foresight import ForesightPlant
 from drivers.virtual.plant_file import PlantSpec
 from drivers.virtual.plate import VirtualPlate
 from drivers.virtual.record import EPOCH_NS
@@ -49,12 +49,25 @@ class VirtualClock:
         return EPOCH_NS + self.segment.now_ns()
 
 
-class AnchoredDriveBus(DriveBus):
-    """A bus whose simulated drives lock their interpolation to the first SYNC."""
+class VirtualDriveBus(DriveBus):
+    """A bus whose simulated drives lock their interpolation to the first SYNC and may know the script."""
 
-    def __init__(self, config: BusConfig, link: SimulatedSegment, plant: RobotPlant) -> None:
+    def __init__(self, config: BusConfig, link: SimulatedSegment, plant: ForesightPlant) -> None:
         super().__init__(config, link)
-        self._plant = plant
+        self._plant, self._fleet = plant, link.fleet
+
+    def foresee(self, targets_rad: np.ndarray) -> None:
+        """Tell the simulation the set points (n, k) [rad] that will be commanded: it then computes in blocks."""
+        columns = [
+            np.rint(targets_rad[:, j] / axis.units.rad_per_count) * drive.data.rad_per_count
+            for j, (axis, drive) in enumerate(zip(self._axes, self._fleet.drives, strict=True))
+        ]
+        self._plant.foresee(np.column_stack(columns))
+
+    def cycle(self, targets_rad: Sequence[float]) -> CycleSample:
+        """Run one SYNC cycle."""
+        self._plant.expect(self._ledger.cycle + 1)
+        return super().cycle(targets_rad)
 
     def enable(self) -> CycleSample:
         """Start SYNC and enable every drive."""
@@ -67,10 +80,10 @@ class VirtualBench:
     """Everything that a run needs, and what tests look at."""
 
     robot: VirtualRobot
-    plant: RobotPlant
+    plant: ForesightPlant
     fleet: Fleet
     segment: SimulatedSegment
-    drives: DriveBus
+    drives: VirtualDriveBus
     plate: VirtualPlate | None
     clock: VirtualClock
 
@@ -98,7 +111,7 @@ def open_bench(
     config = virtual_bus(spec, rate_hz)
     robot, plant, fleet = virtual_fleet(spec, config, seed, effects, start_q, plan)
     segment = SimulatedSegment(fleet, config.can.bitrate_hz)
-    drives = AnchoredDriveBus(config, segment, plant)
+    drives = VirtualDriveBus(config, segment, plant)
     plate = None
     if spec.plate is not None:
         plate = VirtualPlate(robot, segment, plant.robot_time_s, seed, plate_faults)
@@ -117,13 +130,13 @@ def virtual_bus(spec: PlantSpec, rate_hz: float) -> BusConfig:
 def virtual_fleet(
     spec: PlantSpec, config: BusConfig, seed: int, effects: Sequence[EffectSpec],
     start_q: np.ndarray | None, plan: FaultPlan | None,
-) -> tuple[VirtualRobot, RobotPlant, Fleet]:
+) -> tuple[VirtualRobot, ForesightPlant, Fleet]:
     """The robot, its coupling to the bus, and its fake drives."""
     period_s = 1e-6 * common_period_us([load_profile(axis.profile) for axis in config.axes], config.rate_hz)
     lower, upper, speed = joint_limits(spec)
     start = np.clip(np.zeros(len(spec.joints)), lower, upper) if start_q is None else start_q
     robot = VirtualRobot(spec, effects, seed, period_s, start)
-    plant = RobotPlant(robot)
+    plant = ForesightPlant(robot, seed)
     fleet = Fleet([_nameplate(spec, index) for index in range(len(spec.joints))], plant, plan)
     for drive, fastest in zip(fleet.drives, speed, strict=True):
         window_rad = 0.05 + _LAG_CYCLES * period_s * float(fastest)

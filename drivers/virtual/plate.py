@@ -70,7 +70,7 @@ class RobotLoad:
 
     def _compute(self, t_s: float) -> None:
         instants = np.array([self._time_s(t_s + i * self._period_s) for i in range(_BLOCK)])
-        known = instants <= self._robot.plant.time_s + 1e-12
+        known = instants <= self._robot.time_s + 1e-12  # the plant may have been computed further ahead
         instants = instants[: max(1, int(known.sum()))]
         instants[0] = min(instants[0], self._robot.plant.time_s)
         wrench = self._robot.plant.wrench(instants) + self._noise.next(len(instants))

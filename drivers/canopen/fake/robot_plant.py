@@ -81,15 +81,18 @@ class RobotPlant:
         self._velocities = np.zeros_like(self._targets)
         self._origin_ns: int | None = None
         self._origin_s = 0.0
-        self._last_s = 0.0
+        self._last_s = self._sampled_s = 0.0
         self.axes: Sequence[RobotAxis] = tuple(RobotAxis(self, i) for i in range(len(self._targets)))
 
     def set_target(self, index: int, position_rad: float) -> None:
         """Set one joint's target [rad]; it counts from the next period on."""
+        self._run()
         self._targets[index] = position_rad
 
     def sample(self, index: int) -> tuple[float, float, float]:
         """Position [rad], current [A], velocity [rad/s] of one joint."""
+        if self._sampled_s < self._last_s:
+            self._sample()
         return float(self._positions[index]), float(self._currents[index]), float(self._velocities[index])
 
     def robot_time_s(self, time_ns: int) -> float:
@@ -106,21 +109,27 @@ class RobotPlant:
         self._origin_s += shift_s % self._plant.period_s
 
     def advance_to(self, time_ns: int) -> None:
-        """Run the robot up to `time_ns` of the bus and sample all joints once."""
-        time_s = self.robot_time_s(time_ns)
-        if time_s <= self._last_s:
-            return
-        self._robot.command_position(self._targets)
-        self._robot.advance_to(time_s)
-        before = self._positions
+        """Let time pass up to `time_ns` of the bus; the robot catches up when somebody looks or commands."""
+        self._last_s = max(self._last_s, self.robot_time_s(time_ns))
+
+    def _run(self) -> None:
+        if self._robot.time_s < self._last_s:
+            self._robot.command_position(self._targets)
+            self._robot.advance_to(self._last_s)
+
+    def _sample(self) -> None:
+        """All joints at once, at the time reached."""
+        self._run()
+        time_s, before = self._last_s, self._positions
         self._positions = np.array(self._robot.sample_encoders(time_s), dtype=float)
         self._currents = np.array(self._robot.sample_currents(time_s), dtype=float)
-        self._velocities = (self._positions - before) / (time_s - self._last_s)
-        self._last_s = time_s
+        self._velocities = (self._positions - before) / (time_s - self._sampled_s)
+        self._sampled_s = time_s
 
     def _start(self, time_ns: int) -> None:
         """Put the first SYNC a reserve ahead of the end of the robot's computed time."""
         start_s = self._plant.time_s - _RESERVE * self._plant.period_s
         while start_s < self._robot.time_s:
             start_s += self._plant.period_s
-        self._origin_ns, self._origin_s, self._last_s = time_ns, start_s, self._robot.time_s
+        self._origin_ns, self._origin_s = time_ns, start_s
+        self._last_s = self._sampled_s = self._robot.time_s
