@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import interpolate
+from scipy import interpolate, ndimage
 
 from identify.dataset import Dataset
 from identify.errors import NotPeriodicError
@@ -21,7 +21,8 @@ from identify.rotations import FloatArray
 from identify.smoothing import SmoothMotion, smooth
 
 _CHUNK = 4096  # samples a pass: rows of all parameters fit the memory
-_STANDING = 3.0  # std of the speed within which a drive counts as standing: its friction fades to zero there
+_STANDING = 3.0  # std of the speed within which a drive may be standing
+_STANDS_S = 0.25  # and so long it must stay there; a mere reversal keeps its step of friction
 
 
 @dataclass(frozen=True)
@@ -184,14 +185,24 @@ def _stream(
 def _rows(full: FullModel, motion: SmoothMotion, t_s: FloatArray, drives: bool) -> FloatArray:
     """The linear model at instants, shape (channels, K)."""
     model, parts = full.model, []
-    speed_std = np.abs(model.robot.drive_matrix) @ motion.velocity_std
+    speed_std = (np.abs(model.robot.drive_matrix) @ motion.velocity_std)[:, None]
+    stands = _standing(drive_velocity(model.robot, motion.qd), speed_std, motion.rate_hz)
     for first in range(0, len(t_s), _CHUNK):
-        q, qd, qdd = motion.at(t_s[first : first + _CHUNK])
+        t = t_s[first : first + _CHUNK]
+        q, qd, qdd = motion.at(t)
         if drives:
             speed = drive_velocity(model.robot, qd)
-            sign = np.clip(speed / np.maximum(_STANDING * speed_std[:, None], 1e-12), -1.0, 1.0)
-            rows = model.drive_rows(q, qd, qdd, sign=sign)
+            at = np.clip(np.round((t - motion.t_s[0]) * motion.rate_hz).astype(int), 0, len(motion.t_s) - 1)
+            faded = np.clip(speed / np.maximum(_STANDING * speed_std, 1e-12), -1.0, 1.0)
+            rows = model.drive_rows(q, qd, qdd, sign=np.where(stands[:, at], faded, np.sign(speed)))
         else:
             rows = model.wrench_rows(q, qd, qdd)
         parts.append(np.tensordot(rows.columns, full.theta, axes=([1], [0])) + rows.known)
     return np.concatenate(parts, axis=1)
+
+
+def _standing(speed: FloatArray, speed_std: FloatArray, rate_hz: float) -> FloatArray:
+    """Drives at rest for a while, shape (n, B): their friction fades instead of following the encoder's noise."""
+    slow = np.abs(speed) < _STANDING * speed_std
+    length = max(int(_STANDS_S * rate_hz), 1)
+    return ndimage.binary_opening(slow, np.ones((1, length)))

@@ -10,10 +10,15 @@ from daq.recording import Recording
 from identify.diagnosis.diagnose import DiagnoseOptions, diagnose
 from identify.diagnosis.findings import Diagnosis
 from identify.fit import Fit, FitOptions, fit
+from service.against import against_estimate, suitable
+from service.against_simulation import against_simulation
 from service.datasets import dataset_of, open_recording
 from service.diagnosis_file import diagnosis_content
+from service.estimate_reading import Estimate, read_estimate
 from service.identification import robot_for, same_robot
 from service.robots import LoadedRobot
+
+_MCAP = b"\x89MCAP"
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ def diagnose_log(
     validate_path: str | Path | None = None,
     fit_options: FitOptions | None = None,
     options: DiagnoseOptions | None = None,
+    against: str | Path | None = None,
 ) -> Diagnosed:
     """Diagnose a log.
 
@@ -50,6 +56,7 @@ def diagnose_log(
         validate_path: a recording that is not to be used in the fit.
         fit_options: how to fit the baseline.
         options: effects and levels.
+        against: an earlier estimate (JSON), or a simulator's log (MCAP).
 
     Returns:
         The diagnosis.
@@ -59,7 +66,35 @@ def diagnose_log(
     if validate_path is not None:
         recordings.append(open_recording(validate_path))
         same_robot(*recordings)
-    baseline = fit(loaded.robot, dataset_of(recordings[0], loaded), fit_options)
+    data = dataset_of(recordings[0], loaded)
+    reference = None if against is None else _reference(against)
+    if isinstance(reference, Estimate):
+        fit_options = suitable(reference, loaded, fit_options or FitOptions(), data.wrench is not None)
+    elif reference is not None:
+        same_robot(recordings[0], reference)
+    baseline = fit(loaded.robot, data, fit_options)
     other = dataset_of(recordings[1], loaded) if len(recordings) > 1 else None
-    found = diagnose(baseline, other, options)
-    return Diagnosed(loaded, recordings, baseline, found, diagnosis_content(found, baseline, loaded, recordings))
+    found, compared = _compared(diagnose(baseline, other, options), baseline, loaded, reference)
+    content = diagnosis_content(found, baseline, loaded, recordings)
+    content["against"] = compared
+    return Diagnosed(loaded, recordings, baseline, found, content)
+
+
+def _reference(path: str | Path) -> Estimate | Recording:
+    """Read what to compare with: a log by its first bytes, else an estimate."""
+    try:
+        with open(path, "rb") as stream:
+            is_log = stream.read(len(_MCAP)) == _MCAP
+    except OSError:
+        is_log = False  # the reader of estimates says what is wrong with the path
+    return open_recording(path) if is_log else read_estimate(path)
+
+
+def _compared(
+    found: Diagnosis, baseline: Fit, loaded: LoadedRobot, reference: Estimate | Recording | None
+) -> tuple[Diagnosis, dict[str, Any] | None]:
+    if reference is None:
+        return found, None
+    if isinstance(reference, Estimate):
+        return against_estimate(found, baseline, loaded, reference)
+    return found, against_simulation(found, baseline, loaded, reference)

@@ -102,7 +102,7 @@ def _curve(
     model = factor * _parts(problem, augmented, item)[b][c][used]
     measured = factor * rests[b][c][used] + model
     pick = (lambda x: x) if problem.fit.thinning is None else problem.fit.thinning.pick
-    name, unit, values, explains = _variable(scene, item, model, lambda x: pick(x)[used])
+    name, unit, values, explains = _variable(scene, item, channel, model, lambda x: pick(x)[used])
     inside = _shown(values, model)
     order = np.argsort(values[inside], kind="stable")
     groups = np.array_split(np.flatnonzero(inside)[order], min(_REGIONS, max(int(inside.sum()) // 3, 1)))
@@ -155,9 +155,10 @@ def _candidates(scene: Scene, item: Addition) -> list[tuple[str, str, FloatArray
     return result
 
 
-def _variable(scene: Scene, item: Addition, model: FloatArray, pick) -> tuple[str, str, FloatArray, float]:  # noqa: ANN001
+def _variable(scene: Scene, item: Addition, channel: str, model: FloatArray, pick) -> tuple[str, str, FloatArray, float]:  # noqa: ANN001
     best: tuple[float, str, str, FloatArray] = (_DEPENDS, "time", "s", pick(scene.t_s))
-    for name, unit, series in _candidates(scene, item):
+    own_first = sorted(_candidates(scene, item), key=lambda one: not one[0].endswith(f":{channel}"))
+    for name, unit, series in own_first:
         values = pick(series)
         share = _explained(values, model)
         if share > best[0] + 0.02:

@@ -15,6 +15,7 @@ def diagnose(
     run: Annotated[Path, typer.Argument(help="The log to diagnose (MCAP).")],
     robot: Annotated[str | None, typer.Option(help="Preset name or path of a robot.toml; the log's own when left out.")] = None,
     validate: Annotated[Path | None, typer.Option(help="A recording that is not used in the fit, to show the gain on.")] = None,
+    against: Annotated[Path | None, typer.Option(help="An earlier estimate.json, or a simulator's log (MCAP), to compare with.")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Where to write the diagnosis (JSON).")] = None,
     report: Annotated[Path | None, typer.Option(help="Where to write the report for people (one HTML page that prints).")] = None,
     model: Annotated[str | None, typer.Option(help="combined, internal or external; the richest the log allows when left out.")] = None,
@@ -37,7 +38,7 @@ def diagnose(
     check_writable(output, "the diagnosis")
     check_writable(report, "the report")
     options = FitOptions(kind=model, periodic=False if free else None, free=FreeOptions(bandwidth, decimate, trim))
-    found = diagnose_log(run, robot, validate, options)
+    found = diagnose_log(run, robot, validate, options, against=against)
     if output is not None:
         write_text(output, to_json(found.content), "the diagnosis")
     if report is not None:
@@ -75,9 +76,26 @@ def print_diagnosis(out: Console, content: dict[str, Any]) -> None:
             out.print(f"  These data cannot tell it from: {', '.join(item['alternatives'])}.", markup=False)
     if content["unexplained"]:
         out.print(f"\nUnexplained: {content['unexplained']['sentence']}", markup=False)
+    if content.get("against"):
+        _print_against(out, content["against"])
     _print_rms(out, content)
     for warning in content["warnings"]:
         out.print(f"Warning: {warning}", markup=False)
+
+
+def _print_against(out: Console, found: dict[str, Any]) -> None:
+    from service.cli.output import table
+
+    if found["kind"] == "estimate":
+        if not found["changes"]:
+            out.print(f"\n{found['sentence']}", markup=False)
+        return
+    out.print(f"\n{found['sentence']}", markup=False)
+    keys = ("difference", "parameters", "effects", "rest", "noise")
+    rows = [(channel, *(f"{item[key]:.3g}" for key in keys)) for channel, item in found["channels"].items()]
+    out.print(table("Recording less simulation, RMS (N.m, N)", ("channel", *keys), rows))
+    for item in found["changes"]:
+        out.print(f"  {item['effect']}: {item['sentence']}", markup=False)
 
 
 def _print_rms(out: Console, content: dict[str, Any]) -> None:
