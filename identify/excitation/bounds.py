@@ -8,6 +8,7 @@ from identify.excitation.series import FourierSeries
 from identify.rotations import FloatArray
 
 _POINTS_PER_LINE = 256
+_COARSE_PER_LINE, _NEWTON_STEPS, _NEGLIGIBLE, _TINY = 32, 4, 1e-12, 1e-100
 
 
 def grid_points(series: FourierSeries) -> int:
@@ -46,18 +47,34 @@ def series_extremes(series: FourierSeries, order: int) -> tuple[FloatArray, Floa
         Minima and maxima, each shape (n,).
 
     Source:
-        With z = exp(i w t) a trigonometric polynomial of degree h is z^-h times a polynomial of degree 2 h.
+        With z = exp(i w t) a trigonometric polynomial of degree h is z^-h times a polynomial of degree 2 h. Its
+        roots lose digits where the highest lines are tiny: instants of a coarse grid join them, and all are
+        polished by Newton steps (an instant more can only add a value that the motion does take).
     """
-    wanted, slope = series.derivative(order), series.derivative(order + 1)
+    wanted, slope, bend = (series.derivative(order + k) for k in range(3))
+    grid = series.grid_s(_COARSE_PER_LINE * series.harmonics)
     low, high = np.empty(len(series.offset)), np.empty(len(series.offset))
     for joint in range(len(series.offset)):
-        half = 0.5 * (slope.cosine[joint] - 1j * slope.sine[joint])
-        peak = np.abs(half).max(initial=0.0)
-        roots = np.roots(np.concatenate([half[::-1], [0.0], np.conj(half)])) if peak > 0 else np.ones(1)
-        t_s = np.angle(roots) / (2.0 * np.pi * series.fundamental_hz)
-        values = wanted.evaluate(t_s)[0][joint]
+        t_s = np.concatenate([grid, _root_instants(slope, joint)])
+        for _ in range(_NEWTON_STEPS):
+            curvature = bend.evaluate(t_s)[0][joint]
+            flat = np.abs(curvature) < _NEGLIGIBLE * bend.amplitude()[joint] + _TINY
+            step = slope.evaluate(t_s)[0][joint] / np.where(flat, np.inf, curvature)
+            t_s = t_s - np.clip(step, -grid[1], grid[1])
+        values = wanted.evaluate(np.concatenate([grid, t_s]))[0][joint]
         low[joint], high[joint] = values.min(), values.max()
     return low, high
+
+
+def _root_instants(slope: FourierSeries, joint: int) -> FloatArray:
+    """Phases of the roots of one joint's slope, as instants [s]."""
+    half = 0.5 * (slope.cosine[joint] - 1j * slope.sine[joint])
+    peak = np.abs(half).max()
+    if peak < _TINY:
+        return np.zeros(1)
+    half = np.where(np.abs(half) < _NEGLIGIBLE * peak, 0.0, half / peak)
+    roots = np.roots(np.concatenate([half[::-1], [0.0], np.conj(half)]))
+    return np.angle(roots) / (2.0 * np.pi * slope.fundamental_hz)
 
 
 def sampled_peak(values: FloatArray) -> FloatArray:

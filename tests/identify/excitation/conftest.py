@@ -5,16 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.excitation.design import DesignOptions, prepare
+from identify.excitation.design import DesignOptions, design, prepare
 from identify.excitation.series import FourierSeries
 from identify.robot import Drive, ForcePlate, Joint, Limits, Robot
 
 
 def joint(name, xyz, axis, limits, **drive):
-    return Joint(name, f"link_{name}", False, np.eye(3), np.array(xyz), np.array(axis), limits, Drive(**drive))
+    return Joint(
+        name, f"link_{name}", False, np.eye(3), np.array(xyz), np.array(axis), limits, Drive(**drive)
+    )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def two_axes():
     """A turntable with a shoulder on a tared plate."""
     return Robot(
@@ -27,7 +29,7 @@ def two_axes():
     )  # fmt: skip
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def with_limits():
     """Replace the limits of one joint."""
 
@@ -39,18 +41,24 @@ def with_limits():
     return change
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def problem(two_axes):
     return prepare(two_axes, DesignOptions(harmonics=3, fundamental_hz=0.2))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def quick():
     """Options of a small search."""
     return DesignOptions(harmonics=3, fundamental_hz=0.2, starts=2, refined=1)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def random_series():
     rng = np.random.default_rng(11)
     return FourierSeries(0.1, rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=(3, 4)))
+
+
+@pytest.fixture(scope="session")
+def found(two_axes, quick):
+    """A finished design."""
+    return design(two_axes, quick)

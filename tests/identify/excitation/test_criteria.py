@@ -62,7 +62,9 @@ def test_discriminating_value_is_the_distance_left_by_baseline_and_rival(matrix)
     for effect, rival in ((4, 5), (5, 4)):
         known = [0, 1, 2, 3, rival]
         g = matrix
-        rest = g[effect, effect] - g[effect, known] @ np.linalg.solve(g[np.ix_(known, known)], g[known, effect])
+        rest = g[effect, effect] - g[effect, known] @ np.linalg.solve(
+            g[np.ix_(known, known)], g[known, effect]
+        )
         values.append(np.log(rest))
     soft = Discriminating(4, (np.array([4]), np.array([5])))(matrix)[0]
     assert -min(values) <= soft <= -min(values) + np.log(2) / 4.0 + 1e-9

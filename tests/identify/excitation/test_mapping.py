@@ -37,7 +37,9 @@ def test_gradient_of_the_mapping(problem):
 
     def weighted(z):
         motion = smooth_motion(mapping, z, 20.0)
-        return sum(np.sum(bar * part) for bar, part in zip(bars, (motion.q, motion.qd, motion.qdd), strict=True))
+        return sum(
+            np.sum(bar * part) for bar, part in zip(bars, (motion.q, motion.qd, motion.qdd), strict=True)
+        )
 
     found = smooth_motion(mapping, x, 20.0).pull_back(*bars)
     steps = 1e-6 * np.eye(len(x))

@@ -14,7 +14,10 @@ def numeric_gradient(problem, x, step=1e-5):
     ways = step * np.eye(len(x))
     return np.array(
         [
-            (problem.value_and_gradient(x + way, 25.0, 1e3)[0] - problem.value_and_gradient(x - way, 25.0, 1e3)[0])
+            (
+                problem.value_and_gradient(x + way, 25.0, 1e3)[0]
+                - problem.value_and_gradient(x - way, 25.0, 1e3)[0]
+            )
             / (2 * step)
             for way in ways
         ]
