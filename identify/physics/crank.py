@@ -6,8 +6,8 @@ import numpy as np
 
 from identify.rotations import FloatArray
 
-# 2 A B / (A^2 + B^2) of the pivots' radii: a rod five times its crank; a stated geometry is not asked for, and what
-# another ratio changes in the rod's length is taken up by the second coefficient
+# 2 A B / (A^2 + B^2) of the pivots' radii: a rod five times its crank; what another ratio changes in the
+# rod's length is taken up by the second coefficient
 _ECCENTRICITY = 0.385
 _SHORTEST = np.sqrt(1.0 - _ECCENTRICITY)
 

@@ -28,7 +28,7 @@ def _steps(scene: Scene, speed: FloatArray) -> FloatArray:
 
 
 def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArray:
-    """Rate of the smooth rows, and the samples between a true and a read reversal, whose friction is turned."""
+    """Rate of the smooth rows, and the samples between a true and a read reversal, whose friction turns."""
     now = _steps(scene, scene.speed)
     turned = _steps(scene, delayed(scene, scene.speed, -shape["late"])) - now
     return np.stack([scene.ddt(scene.prediction - now), turned], axis=1)

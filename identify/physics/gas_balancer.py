@@ -36,8 +36,8 @@ EFFECT = Effect(
     columns=_columns,
     places=revolute_drives,
     sentence=(
-        "{place} is balanced by a gas spring with its dead centre at {phi}: {pressure} at rest and {constant} from the "
-        "air outside, lagging the stroke as its gas warms and cools within {heat_time}."
+        "{place} is balanced by a gas spring with its dead centre at {phi}: {pressure} at rest and "
+        "{constant} from the air outside, lagging the stroke as its gas warms and cools within {heat_time}."
     ),
     reference=(
         "p0 (V0/(V0 - A x))^n A: n = 1 when slow, 1.4 when fast; between them the heat exchange makes a "

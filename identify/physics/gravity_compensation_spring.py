@@ -34,8 +34,8 @@ EFFECT = Effect(
     columns=_columns,
     places=_places,
     sentence=(
-        "{place} is balanced by a spring that the robot file does not state, with its dead centre at {phi}: {preload} "
-        "from its preload and {stiffness} from its stretch, at the length of its crank's hypotenuse."
+        "{place} is balanced by a spring that the robot file does not state, with its dead centre at {phi}: "
+        "{preload} from its preload and {stiffness} from its stretch."
     ),
     reference="k A B sin(q - phi) (1 - l0/l) = k A B sin(q - phi)/l ((l_min - l0) + (l - l_min))",
     shapes=(Shape("phi", "rad", (-2.7, -1.8, -0.9, 0.0, 0.9, 1.8, 2.7, 3.6)),),
