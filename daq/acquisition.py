@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import gc
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from daq.limits import Limits, Watch
 from daq.log_writer import LogWriter
 from daq.ports import BootReport, Clock, Drives, Plate, PlateRest, PlateSample
 from daq.preflight import Check, expected_bytes, motion_checks, output_checks, require
+from daq.realtime import keeping_time
 from daq.recorder import Recorder, Scale
 from daq.run_report import RunReport
 from daq.run_state import RunEvent, RunState, RunStatus
@@ -102,6 +102,7 @@ class Acquisition:
         self._after: PlateRest | None = None
         self._last_ns = 0
         self._overloaded = 0
+        self._granted = ""
         self._kept = -1  # the last cycle handed to the recorder
 
     def abort(self, reason: str) -> None:
@@ -126,12 +127,14 @@ class Acquisition:
             KeyboardInterrupt: the operator insisted: the drives were halted at once, the unfinished log
                 lies beside its final name.
         """
-        try:
-            self._try_to_run()
-            self._settle()
-        except BaseException:
-            self._give_up()
-            raise
+        with keeping_time(not self.job.patient) as granted:
+            self._granted = granted
+            try:
+                self._try_to_run()
+                self._settle()
+            except BaseException:
+                self._give_up()
+                raise
         return self._close()
 
     def _try_to_run(self) -> None:
@@ -168,7 +171,8 @@ class Acquisition:
         plate = {f"plate_{key}": value for key, value in (self.plate.facts() if self.plate else {}).items()}
         metadata = {
             **self.job.metadata, **plan.metadata(), **plate, "outcome": "unfinished",
-            "clock_offset_ns": str(offset_ns), "sync_period_ns": str(boot.period_ns),
+            "scheduling": self._granted or "ordinary", "clock_offset_ns": str(offset_ns),
+            "sync_period_ns": str(boot.period_ns),
         }
         self._writer = LogWriter(self.job.path, metadata, self.job.attachments)
         self._scale = Scale(
@@ -185,14 +189,9 @@ class Acquisition:
         self.status.advance(RunEvent.ENABLED)
         self._event("moving", "info", "the drives follow their set points")
         rows = plan.q.tolist()
-        watch = Watch(self.job.limits, plan.period_s)
-        gc.collect()
-        gc.disable()  # a collection in the cycle costs milliseconds
-        try:
-            for target in rows:
-                self._one_cycle(target, watch, recorder)
-        finally:
-            gc.enable()
+        watch = Watch(self.job.limits)
+        for target in rows:
+            self._one_cycle(target, watch, recorder)
         self.drives.stop()
         self.status.advance(RunEvent.MOVED)
 
@@ -210,7 +209,7 @@ class Acquisition:
         reason = watch.measured([
             None if counts is None else counts * units.rad_per_count
             for counts, units in zip(sample.position, self._scale.units, strict=True)
-        ])
+        ], sample.sync_ns)
         if reason is not None:
             raise HardwareError(reason)
         if recorder.failure is not None:

@@ -13,8 +13,8 @@ from daq.errors import UsageError
 _RECENT = 6
 """Set points against which a measurement is compared: drives act one to four cycles late."""
 
-_SPEED_MARGIN = 1.1
-"""Measured speeds are differences of noisy positions."""
+_SPEED_MARGIN = 1.3
+"""After a late SYNC the next ones follow at 0.8 of the period; measured speeds are noisy besides."""
 
 _SPEED_CYCLES = 8
 """Cycles over which a measured speed is taken."""
@@ -99,27 +99,26 @@ class Watch:
 
     Args:
         limits: the envelope.
-        period_s: bus period.
     """
 
-    def __init__(self, limits: Limits, period_s: float) -> None:
+    def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._lower = (limits.lower - limits.envelope).tolist()
         self._upper = (limits.upper + limits.envelope).tolist()
         self._speed = (_SPEED_MARGIN * limits.velocity).tolist()
         self._following = limits.following.tolist()
         self._recent: deque[Sequence[float]] = deque(maxlen=_RECENT)
-        self._past: deque[Sequence[float | None]] = deque(maxlen=_SPEED_CYCLES + 1)
-        self._span_s = _SPEED_CYCLES * period_s
+        self._past: deque[tuple[Sequence[float | None], int]] = deque(maxlen=_SPEED_CYCLES + 1)
 
     def commanded(self, target: Sequence[float]) -> None:
         """Take the set points (k,) of a cycle."""
         self._recent.append(target)
 
-    def measured(self, position: Sequence[float | None]) -> str | None:
-        """Judge the positions (k,) sampled in a cycle, None where missing; return the reason to stop."""
-        self._past.append(position)
-        oldest = self._past[0] if len(self._past) == self._past.maxlen else None
+    def measured(self, position: Sequence[float | None], instant_ns: int) -> str | None:
+        """Judge positions (k,) sampled at an instant, None where missing; return the reason to stop."""
+        self._past.append((position, instant_ns))
+        oldest, then_ns = self._past[0] if len(self._past) == self._past.maxlen else (None, 0)
+        span_s = (instant_ns - then_ns) * 1e-9
         for j, q in enumerate(position):
             if q is None:
                 continue
@@ -130,8 +129,8 @@ class Watch:
             if apart > self._following[j]:
                 return self._apart(j, q, apart)
             before = oldest[j] if oldest is not None else None
-            if before is not None and abs(q - before) > self._speed[j] * self._span_s:
-                return self._too_fast(j, abs(q - before) / self._span_s)
+            if before is not None and abs(q - before) > self._speed[j] * span_s:
+                return self._too_fast(j, abs(q - before) / span_s)
         return None
 
     def _outside(self, j: int, q: float) -> str:

@@ -38,6 +38,8 @@ class Bench:
     is_virtual: bool
     foresee: Callable[[np.ndarray], None] = lambda targets_rad: None
     """Tell a simulation the set points (n, k) to come."""
+    close: Callable[[], None] = lambda: None
+    """End what the bench itself started."""
 
 
 def limits_for(loaded: LoadedRobot) -> Limits:

@@ -97,7 +97,10 @@ class Session:
         Raises:
             RunFailedError, RunAbortedError: it did not complete; both carry the report.
         """
-        report = self.acquisition.execute()
+        try:
+            report = self.acquisition.execute()
+        finally:
+            self.bench.close()
         if report.state is RunState.ABORTED:
             raise RunAbortedError(report.sentence, report)
         if report.state is not RunState.RECORDED:
@@ -184,7 +187,8 @@ def open_session(request: RecordRequest, listeners: Sequence[Callable[[Change], 
     _check_output(request.output)
     bench = _bench(request, loaded, rate_hz)
     job = Job(
-        path=request.output, plan=_foreseen(motion.plan, bench), limits=limits, metadata=_metadata(request, loaded),
+        path=request.output, plan=_foreseen(motion.plan, bench), limits=limits,
+        metadata=_metadata(request, loaded),
         attachments=_attachments(loaded, motion), patient=bench.is_virtual and not request.is_real_time,
         checks=lambda: _checks(bench),
     )
@@ -243,7 +247,7 @@ def _check_output(path: Path) -> None:
     if partial.exists():
         raise DaqUsageError(
             f"{partial} exists: an unfinished log lies there; `residuum recover {partial} -o whole.mcap` "
-            "saves it, then delete it."
+            "saves it; then delete it."
         )
 
 

@@ -52,12 +52,14 @@ class VirtualClock:
 class VirtualDriveBus(DriveBus):
     """A bus whose simulated drives lock their interpolation to the first SYNC and may know the script."""
 
-    def __init__(self, config: BusConfig, link: SimulatedSegment, plant: ForesightPlant) -> None:
+    def __init__(
+        self, config: BusConfig, link: SimulatedSegment, plant: ForesightPlant
+    ) -> None:
         super().__init__(config, link)
         self._plant, self._fleet = plant, link.fleet
 
     def foresee(self, targets_rad: np.ndarray) -> None:
-        """Tell the simulation the set points (n, k) [rad] that will be commanded: it then computes in blocks."""
+        """Tell the simulation the set points (n, k) [rad] to come: it then computes in blocks."""
         columns = [
             np.rint(targets_rad[:, j] / axis.units.rad_per_count) * drive.data.rad_per_count
             for j, (axis, drive) in enumerate(zip(self._axes, self._fleet.drives, strict=True))
@@ -132,19 +134,32 @@ def virtual_fleet(
     start_q: np.ndarray | None, plan: FaultPlan | None,
 ) -> tuple[VirtualRobot, ForesightPlant, Fleet]:
     """The robot, its coupling to the bus, and its fake drives."""
-    period_s = 1e-6 * common_period_us([load_profile(axis.profile) for axis in config.axes], config.rate_hz)
-    lower, upper, speed = joint_limits(spec)
-    start = np.clip(np.zeros(len(spec.joints)), lower, upper) if start_q is None else start_q
-    robot = VirtualRobot(spec, effects, seed, period_s, start)
+    robot = robot_on(spec, config, seed, effects, start_q)
     plant = ForesightPlant(robot, seed)
-    fleet = Fleet([_nameplate(spec, index) for index in range(len(spec.joints))], plant, plan)
-    for drive, fastest in zip(fleet.drives, speed, strict=True):
-        window_rad = 0.05 + _LAG_CYCLES * period_s * float(fastest)
-        drive.dictionary.values[_WINDOW] = round(window_rad / abs(drive.data.rad_per_count))
+    fleet = Fleet([nameplate(spec, index) for index in range(len(spec.joints))], plant, plan)
+    widen_windows(fleet, spec, robot.plant.period_s)
     return robot, plant, fleet
 
 
-def _nameplate(spec: PlantSpec, index: int) -> DriveData:
+def robot_on(
+    spec: PlantSpec, config: BusConfig, seed: int, effects: Sequence[EffectSpec], start_q: np.ndarray | None
+) -> VirtualRobot:
+    """The robot at rest, its drives interpolating with the bus' SYNC period."""
+    period_s = 1e-6 * common_period_us([load_profile(axis.profile) for axis in config.axes], config.rate_hz)
+    lower, upper, _ = joint_limits(spec)
+    start = np.clip(np.zeros(len(spec.joints)), lower, upper) if start_q is None else start_q
+    return VirtualRobot(spec, effects, seed, period_s, start)
+
+
+def widen_windows(fleet: Fleet, spec: PlantSpec, period_s: float) -> None:
+    """Set each drive's following error window (6065h) to what its fastest motion needs."""
+    for drive, fastest in zip(fleet.drives, joint_limits(spec)[2], strict=True):
+        window_rad = 0.05 + _LAG_CYCLES * period_s * float(fastest)
+        drive.dictionary.values[_WINDOW] = round(window_rad / abs(drive.data.rad_per_count))
+
+
+def nameplate(spec: PlantSpec, index: int) -> DriveData:
+    """A drive of the size that the joint needs, current resolved to a tenth of its noise."""
     joint = spec.joints[index]
     effort_nm = read_tree(spec.urdf_text).joint(joint.name).effort
     peak_a = effort_nm / (joint.gear_ratio * joint.torque_constant_nm_a)

@@ -1,4 +1,4 @@
-"""A simulated run whose set points are known beforehand: physics is computed in blocks, and taken back if wrong.
+"""A simulated run whose set points are known: physics is computed in blocks, and taken back if wrong.
 
 The fake drives need a position and a current at every SYNC. One by one that costs ten times what a block of
 instants costs. A block assumes that the coming set points are those of the script; the first one that is not
