@@ -146,6 +146,6 @@ def _print_summary(folder: Path, summary: dict[str, Any]) -> None:
         (r["name"], f"{r['truth']:g}", significant(r["estimate"], r["std"]), uncertainty(r["std"]), f"{r['deviation_in_std']:+.1f}")
         for r in summary["comparison"]
     ]
-    out.print(table("", ("quantity", "truth", "estimate", "std", "off by [std]"), rows))
+    out.print(table("", ("quantity", "truth", "estimate", "std", "off by (std)"), rows))
     out.print(f"Concealed: {summary['concealed']}. The diagnosis said: {summary['verdict']}, {', '.join(summary['named']) or 'no name'}.", markup=False)
     out.print(f"Took {summary['seconds']} s. Everything lies in {folder}; open report.html in a browser, the logs in Foxglove or PlotJuggler.", markup=False)
