@@ -43,6 +43,7 @@ class LogWriter:
         path: final name of the log.
         metadata: the run's ``residuum.run`` record.
         attachments: files to carry along, name to content.
+        file: go on writing this one instead of a new one.
 
     Raises:
         UsageError: the file cannot be created.
@@ -53,8 +54,9 @@ class LogWriter:
         path: str | Path,
         metadata: Mapping[str, str] | None = None,
         attachments: Mapping[str, bytes] | None = None,
+        file: McapWriter | None = None,
     ) -> None:
-        self.file = McapWriter(path)
+        self.file = file or McapWriter(path)
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._templates: dict[tuple[object, ...], RecordTemplate] = {}

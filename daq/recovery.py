@@ -11,6 +11,7 @@ import numpy as np
 
 from daq.checks import unwrapped
 from daq.errors import DataError
+from daq.log_writer import LogWriter
 from daq.mcap_file import checked, decompressor, load_bytes
 from daq.mcap_records import (
     MAGIC,
@@ -29,6 +30,7 @@ from daq.mcap_records import (
     walk,
 )
 from daq.mcap_writer import McapWriter
+from daq.recording import Stream
 
 _KNOWN = {int(op) for op in Op}
 _MESSAGE_FIELDS = MESSAGE_HEADER - RECORD_HEADER
@@ -106,12 +108,26 @@ class _Salvage:
     finished: bool = False
 
 
-def recover(source: str | Path, output: str | Path) -> Recovery:
+@dataclass(frozen=True)
+class Addition:
+    """What can be worked out from what was saved, and is added to it.
+
+    Attributes:
+        streams: whole streams.
+        metadata: entries of the run's record.
+    """
+
+    streams: tuple[Stream, ...] = ()
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+def recover(source: str | Path, output: str | Path, addition: Addition | None = None) -> Recovery:
     """Write everything intact in ``source``, in file order, to a whole new log.
 
     Args:
         source: a damaged or unfinished log.
         output: the new log's name.
+        addition: what is written behind it.
 
     Returns:
         What was saved and what was lost.
@@ -125,7 +141,7 @@ def recover(source: str | Path, output: str | Path) -> Recovery:
     _salvage(data, found)
     if not any(_messages(block) for block in found.blocks):
         raise DataError(f"{source} holds no intact message: nothing can be recovered from it.")
-    counts = _write(found, output)
+    counts = _write(found, output, addition or Addition())
     return Recovery(
         source=str(source), output=str(output), topics=_losses(found, counts),
         damaged_chunks=tuple(found.damaged), torn_messages=found.torn_messages, skipped_bytes=found.skipped,
@@ -304,7 +320,7 @@ def _messages(block: bytes) -> list[tuple[int, int]]:
             if opcode == Op.MESSAGE and stop - start >= _MESSAGE_FIELDS]
 
 
-def _write(found: _Salvage, output: str | Path) -> Mapping[int, np.ndarray]:
+def _write(found: _Salvage, output: str | Path, addition: Addition) -> Mapping[int, np.ndarray]:
     """Write the new log; channel to (n, 2) sequence numbers and log times."""
     writer = McapWriter(output)
     try:
@@ -313,11 +329,19 @@ def _write(found: _Salvage, output: str | Path) -> Mapping[int, np.ndarray]:
         for attachment in found.attachments:
             writer.add_attachment(attachment.name, attachment.data)
         seen = _write_messages(found, writer)
+        _write_addition(addition, writer)
         writer.finish()
     except BaseException:
         writer.abandon(keep=False)
         raise
     return {channel: np.array(rows, np.int64) for channel, rows in seen.items()}
+
+
+def _write_addition(addition: Addition, writer: McapWriter) -> None:
+    log = LogWriter(writer.path, file=writer)
+    if addition.metadata:
+        log.add_metadata(addition.metadata)
+    log.write_streams(addition.streams)
 
 
 def _write_messages(found: _Salvage, writer: McapWriter) -> dict[int, list[tuple[int, int]]]:

@@ -72,9 +72,11 @@ class VirtualDriveBus(DriveBus):
         return super().cycle(targets_rad)
 
     def enable(self) -> CycleSample:
-        """Start SYNC and enable every drive."""
+        """Start SYNC and enable every drive; faults count from the first set point."""
         self._plant.anchor(self._link.now_ns())
-        return super().enable()
+        sample = super().enable()
+        self._fleet.plan.arm(self.sync)
+        return sample
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ def recover(
     from dataclasses import asdict
 
     from daq.errors import UsageError
-    from daq.recovery import recover as salvage
+    from service.salvage import salvage_run as salvage
 
     if output.exists() and log.exists() and output.samefile(log):
         raise UsageError(f"{output} is the damaged log itself; give another name with -o.")
