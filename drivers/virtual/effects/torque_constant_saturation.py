@@ -21,7 +21,7 @@ class TorqueConstantSaturation(Effect):
     def ranges(cls, plant: PlantSpec, j: int) -> dict[str, Range]:
         """Parameters and their default ranges."""
         return {
-            "coefficient_1_a2": Range(0.02 / _peak_a(plant, j) ** 2, 0.12 / _peak_a(plant, j) ** 2, "1/A^2")
+            "coefficient_1_a2": Range(0.01 / _peak_a(plant, j) ** 2, 0.04 / _peak_a(plant, j) ** 2, "1/A^2")
         }
 
     def current(self, moments: Moments, current_a: np.ndarray) -> np.ndarray:
@@ -29,8 +29,10 @@ class TorqueConstantSaturation(Effect):
         changed = current_a.copy()
         own = current_a[:, self.j]
         beta, amps = self.p["coefficient_1_a2"], own.copy()
-        for _ in range(8):  # Newton on i (1 - beta i^2) = i0, far from the turning point
+        most = 1.0 / np.sqrt(3.0 * max(beta, 1e-300))  # beyond this more current gives less torque
+        for _ in range(8):  # Newton on i (1 - beta i^2) = i0; where the motor cannot give it, its most
             amps -= (amps * (1.0 - beta * amps**2) - own) / np.maximum(1.0 - 3.0 * beta * amps**2, 0.1)
+            amps = np.clip(amps, -most, most)
         changed[:, self.j] = amps
         return changed
 
