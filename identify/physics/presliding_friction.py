@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from identify.physics.drives import every_drive, fitted
+from identify.physics.drives import every_drive, friction_beside
 from identify.physics.effect import Coefficient, Effect, Place, Shape, only_joint
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
@@ -52,9 +52,17 @@ def _state(scene: Scene, joint: int, slide: float) -> FloatArray:
     return state
 
 
+def _column(scene: Scene, joint: int, slide: float) -> FloatArray:
+    return _state(scene, joint, slide) - scene.direction[joint]
+
+
 def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArray:
-    joint = place.joint
-    return only_joint(scene, joint, _state(scene, joint, shape["xs"]) - scene.direction[joint])
+    return only_joint(scene, place.joint, _column(scene, place.joint, shape["xs"]))
+
+
+def _part_of_the_friction(scene: Scene, place: Place, values: FloatArray, shape: Mapping[str, float]) -> bool:
+    coulomb, _ = friction_beside(scene, place.joint, values[0] * _column(scene, place.joint, shape["xs"]))
+    return bool(values[0] <= _MOST * max(coulomb, 0.0))
 
 
 EFFECT = Effect(
@@ -70,7 +78,5 @@ EFFECT = Effect(
     ),
     reference="Al-Bender & Swevers, CSM 28(6) 2008; Dahl: dz/dt = v (1 - sgn(v) z / xs), friction f z / xs",
     shapes=(Shape("xs", "rad", (5e-5, 1.2e-4, 2.8e-4, 6.6e-4, 1.5e-3, 3.6e-3, 8.5e-3, 2e-2)),),
-    constraint=lambda scene, place, values, shape: bool(
-        values[0] <= _MOST * max(fitted(scene, place.joint, "coulomb"), 0.0)
-    ),
+    constraint=_part_of_the_friction,
 )
