@@ -17,22 +17,22 @@ from pathlib import Path
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-import numpy as np
+import numpy as np  # noqa: E402 - the thread count is read at import
 
-from identify.excitation.design import DesignOptions, design, prepare
-from identify.excitation.workspace import Sphere, Workspace, distant_pairs
-from identify.model import build_model
-from identify.robot import Drive, ForcePlate, Robot
-from identify.urdf import read_urdf
-from service.designs import worker_processes
-from service.robots import load_robot
+from identify.excitation.design import DesignOptions, design, prepare  # noqa: E402 - the thread count is read at import
+from identify.excitation.workspace import Sphere, Workspace, distant_pairs  # noqa: E402 - the thread count is read at import
+from identify.model import build_model  # noqa: E402 - the thread count is read at import
+from identify.robot import Drive, ForcePlate, Robot  # noqa: E402 - the thread count is read at import
+from identify.urdf import read_urdf  # noqa: E402 - the thread count is read at import
+from service.designs import worker_processes  # noqa: E402 - the thread count is read at import
+from service.robots import load_robot  # noqa: E402 - the thread count is read at import
 
 ROOT = Path(__file__).parent.parent
 SIX = ROOT / "drivers" / "virtual" / "presets" / "six_axis.urdf"
 
 
 class Metric:
-    """log10 det(W'W / rows), condition of W and of W with unit columns; torque rows, then torque and wrench."""
+    """log10 det(W'W / rows), condition of W and of W with unit columns; torque rows, then with wrench."""
 
     def __init__(self, robot):
         joints = tuple(replace(j, drive=replace(j.drive, gravity_harmonics=0)) for j in robot.joints)
@@ -102,7 +102,8 @@ def three_axes(figaroh, count):
         data = np.load(figaroh)
         limits = results[0].limits
         over = np.abs(data["qd"]).max(axis=1) / limits.velocity
-        note = f"{data['cpu_s']:.1f} s CPU, converged {data['converged'].tolist()}, velocity/limit {over.max():.2f}"
+        state = "converged" if data["converged"].all() else "not converged"
+        note = f"{data['cpu_s']:.1f} s CPU, {state}, velocity/limit {over.max():.2f}"
         row("FIGAROH 1.0.2", metric(data["q"], data["qd"], data["qdd"]), note)
 
 
@@ -132,7 +133,8 @@ def six_axes(spheres):
     result, cpu, wall = timed(robot, DesignOptions(workspace=workspace))
     name = f"six axes, {len(workspace.pairs)} sphere pairs and floor" if spheres else "six axes"
     print(
-        f"{name}: log det {result.expected.log_det_covariance:.1f} (by hand {result.plain.log_det_covariance:.1f}), "
+        f"{name}: log det {result.expected.log_det_covariance:.1f} (by hand "
+        f"{result.plain.log_det_covariance:.1f}), "
         f"condition {result.expected.condition_number:.4g} ({result.plain.condition_number:.4g}), "
         f"clearance {result.peaks.clearance_m:.3f} m, {cpu:.1f} s CPU, {wall:.1f} s"
     )

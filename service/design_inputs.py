@@ -89,7 +89,8 @@ def robot_workspace(loaded: LoadedRobot, path: Path | None) -> Workspace:
     for section in file.sphere:
         if section.link not in chain.link_of:
             raise UsageError(
-                f"Workspace file {path}: link '{section.link}' is not in the URDF, which has: {', '.join(chain.link_of)}."
+                f"Workspace file {path}: link '{section.link}' is not in the URDF, which has: "
+                f"{', '.join(chain.link_of)}."
             )
         rotation, translation = chain.pose_of[section.link]
         center = translation + rotation @ np.array(section.center)

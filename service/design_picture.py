@@ -32,7 +32,8 @@ def draw_design(result: Design, robot: Robot) -> str:
     drawing.words(
         _LEFT,
         24,
-        f"{result.robot}: {n} joints, {result.series.harmonics} harmonics of {result.series.fundamental_hz:g} Hz, "
+        f"{result.robot}: {n} joints, {result.series.harmonics} harmonics of "
+        f"{result.series.fundamental_hz:g} Hz, "
         f"criterion {result.options.criterion}, {result.model} model",
         15,
     )

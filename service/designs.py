@@ -76,7 +76,7 @@ def design_excitation(
 
 
 def content_hash(content: dict[str, Any]) -> str:
-    """Digest of a file's content: sha256 over JSON with sorted keys and no spaces, the hash itself left out."""
+    """Digest of a file's content: sha256 over JSON with sorted keys and no spaces, without the hash."""
     rest = {key: value for key, value in content.items() if key != "hash"}
     canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()

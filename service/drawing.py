@@ -29,7 +29,8 @@ class Drawing:
     ) -> None:
         """Write words with their baseline at (x, y)."""
         self._parts.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" {_FONT} font-size="{size}" text-anchor="{anchor}" fill="{colour}">'
+            f'<text x="{x:.1f}" y="{y:.1f}" {_FONT} font-size="{size}" '
+            f'text-anchor="{anchor}" fill="{colour}">'
             f"{escape(text)}</text>"
         )
 
@@ -46,7 +47,8 @@ class Drawing:
     def bar(self, x: float, y: float, width: float, height: float, colour: str) -> None:
         """Fill a rectangle."""
         self._parts.append(
-            f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0.5):.1f}" height="{height:.1f}" fill="{colour}"/>'
+            f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0.5):.1f}" '
+            f'height="{height:.1f}" fill="{colour}"/>'
         )
 
     def text(self) -> str:

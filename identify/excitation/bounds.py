@@ -47,9 +47,9 @@ def series_extremes(series: FourierSeries, order: int) -> tuple[FloatArray, Floa
         Minima and maxima, each shape (n,).
 
     Source:
-        With z = exp(i w t) a trigonometric polynomial of degree h is z^-h times a polynomial of degree 2 h. Its
-        roots lose digits where the highest lines are tiny: instants of a coarse grid join them, and all are
-        polished by Newton steps (an instant more can only add a value that the motion does take).
+        With z = exp(i w t) a trigonometric polynomial of degree h is z^-h times a polynomial of degree 2 h.
+        Its roots lose digits where the highest lines are tiny: instants of a coarse grid join them, and all
+        are polished by Newton steps (an instant more can only add a value that the motion does take).
     """
     wanted, slope, bend = (series.derivative(order + k) for k in range(3))
     grid = series.grid_s(_COARSE_PER_LINE * series.harmonics)

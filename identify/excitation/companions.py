@@ -1,4 +1,4 @@
-"""Motions that go with an excitation: its twin in reversed time, a slow copy, points with full stops, sweeps."""
+"""Motions that go with an excitation: its reversed twin, a slow copy, points with full stops, sweeps."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def slow_copy(series: FourierSeries, factor: float = 4.0) -> FourierSeries:
 class Moves:
     """Straight moves in joint space from rest to rest, with a pause after each.
 
-    Each move speeds up over its blend, runs at constant speed and slows down over its blend; speed follows the
-    quintic blend, so acceleration is continuous. A blend of half the duration leaves no constant part.
+    Each move speeds up over its blend, runs at constant speed and slows down over its blend; speed follows
+    the quintic blend, so acceleration is continuous. A blend of half the duration leaves no constant part.
 
     Attributes:
         points: positions, shape (m + 1, n); the arm starts at the first.
@@ -141,7 +141,8 @@ def random_points(
                 break
         else:
             raise DesignError(
-                f"None of {_DRAWS_PER_POINT} random points can be reached from point {len(times)} without touching "
+                f"None of {_DRAWS_PER_POINT} random points can be reached from point "
+                f"{len(times)} without touching "
                 "something or exceeding a torque limit; loosen the workspace."
             )
         points.append(target)

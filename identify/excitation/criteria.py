@@ -53,6 +53,7 @@ class DOptimal:
     name: str = "d"
 
     def __call__(self, information: FloatArray) -> tuple[float, FloatArray]:
+        """Give the value and its derivative by the matrix."""
         value, inverse = log_det(information)
         return -value, -inverse
 
@@ -69,6 +70,7 @@ class AOptimal:
     name: str = "a"
 
     def __call__(self, information: FloatArray) -> tuple[float, FloatArray]:
+        """Give the value and its derivative by the matrix."""
         _, inverse = log_det(information)
         relative = inverse / self.unit_variance[:, None]
         mean = float(np.trace(relative)) / len(relative)
@@ -82,6 +84,7 @@ class ConditionNumber:
     name: str = "condition"
 
     def __call__(self, information: FloatArray) -> tuple[float, FloatArray]:
+        """Give the value and its derivative by the matrix."""
         unit, scale = _normalised(information)
         values, vectors = np.linalg.eigh(unit)
         values = np.maximum(values, _RIDGE)

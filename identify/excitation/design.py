@@ -143,7 +143,8 @@ def _check_options(robot: Robot, options: DesignOptions) -> None:
     least = 4 * options.harmonics
     if samples < least:
         raise DesignError(
-            f"A period of {1 / options.fundamental_hz:g} s holds {samples:.4g} samples at {options.rate_hz:g} Hz, but "
+            f"A period of {1 / options.fundamental_hz:g} s holds {samples:.4g} samples at "
+            f"{options.rate_hz:g} Hz, but "
             f"{options.harmonics} harmonics need at least {least}; lower the fundamental to "
             f"{options.rate_hz / least:.4g} Hz, or raise the rate."
         )
@@ -151,7 +152,8 @@ def _check_options(robot: Robot, options: DesignOptions) -> None:
         raise DesignError("The discriminating criterion needs at least one effect; name it as NAME:JOINT.")
     if options.warm_start is not None and len(options.warm_start.offset) != robot.n:
         raise DesignError(
-            f"The warm start moves {len(options.warm_start.offset)} joints, but robot '{robot.name}' has {robot.n}; "
+            f"The warm start moves {len(options.warm_start.offset)} joints, but robot "
+            f"'{robot.name}' has {robot.n}; "
             "give a design for this robot."
         )
 
@@ -166,7 +168,8 @@ def _check_start(robot: Robot, limits: MotionLimits, pose: tuple[float, ...] | N
     for joint, position in zip(robot.joints, pose, strict=True):
         if not joint.limits.lower <= position <= joint.limits.upper:
             raise DesignError(
-                f"The start position {position:g} of joint '{joint.name}' lies outside its limits {joint.limits.lower:g} "
+                f"The start position {position:g} of joint '{joint.name}' lies outside its "
+                f"limits {joint.limits.lower:g} "
                 f"to {joint.limits.upper:g}; move the arm inside them first."
             )
 

@@ -34,6 +34,7 @@ class Discriminating:
     name: str = "discriminating"
 
     def __call__(self, information: FloatArray) -> tuple[float, FloatArray]:
+        """Give the value and its derivative by the matrix."""
         base = np.arange(self.baseline)
         pairs = (
             [(self.effects[0], np.arange(0))]
@@ -53,7 +54,7 @@ class Discriminating:
 
     @staticmethod
     def _distance(information: FloatArray, known: FloatArray, effect: FloatArray) -> tuple[float, FloatArray]:
-        """Log determinant of the effect's information given the known columns, per column, and its gradient."""
+        """Log determinant of the effect's information beyond the known columns, per column; its gradient."""
         gradient = np.zeros_like(information)
         value = 0.0
         for sign, columns in ((1.0, np.concatenate([known, effect])), (-1.0, known)):

@@ -1,4 +1,4 @@
-"""What a motion tells: the information matrix of parameters, torque constants and effects, and its derivative."""
+"""What a motion tells: the information matrix of parameters, torque constants and effects; its derivative."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from identify.friction import drive_velocity
 from identify.model import Model
 from identify.rotations import FloatArray
 
-# Verdonck, Swevers, Samin 2001: std per sample of the base wrench; the joints' are taken relative to the effort
+# Verdonck, Swevers, Samin 2001: std per sample of the wrench; the joints' are relative to the effort
 WRENCH_NOISE = {
-    "force.x": 10.54, "force.y": 10.88, "force.z": 4.81, "torque.x": 11.61, "torque.y": 11.33, "torque.z": 3.15,
+    "force.x": 10.54, "force.y": 10.88, "force.z": 4.81,
+    "torque.x": 11.61, "torque.y": 11.33, "torque.z": 3.15,
 }  # fmt: skip
 _JOINT_NOISE_SHARE = (
     0.005  # of the effort limit: 3.55 of 600, 4.03 of 900, 1.26 of 300 N.m on the published arm
@@ -37,8 +38,8 @@ class NamedEffect:
 
     Attributes:
         name: as in the catalogue, with its place, such as ``stribeck_friction:joint_2``.
-        columns: (q, qd, qdd) on an even grid of one period, each (n, N), to its columns (channels, k, N) in the
-            channels' units.
+        columns: (q, qd, qdd) on an even grid of one period, each (n, N), to its columns (channels, k, N) in
+            the channels' units.
     """
 
     name: str
@@ -59,7 +60,7 @@ class NoiseLevels:
 
 
 def noise_levels(model: Model, given: Mapping[str, float], where: str = "the robot file") -> NoiseLevels:
-    """Collect noise levels; those not given are published ones (plate) or a share of the effort limit (joints).
+    """Collect noise levels; others are published ones (plate) or a share of the effort limit (joints).
 
     Args:
         model: the model, for its channels.
@@ -87,7 +88,8 @@ def noise_levels(model: Model, given: Mapping[str, float], where: str = "the rob
     count = sum(channel in given for channel in model.channels)
     if count == len(std):
         return NoiseLevels(std, f"All {count} levels from {where}.")
-    rest = f"{len(std) - count} of {len(std)} levels assumed: {_JOINT_NOISE_SHARE:.1%} of the effort limits, published plate noise"
+    assumed = f"{_JOINT_NOISE_SHARE:.1%} of the effort limits, published plate noise"
+    rest = f"{len(std) - count} of {len(std)} levels assumed: {assumed}"
     return NoiseLevels(std, f"{rest}; the others from {where}." if count else f"{rest}.")
 
 
@@ -177,7 +179,7 @@ class InformationModel:
     def baseline_columns(
         self, q: FloatArray, qd: FloatArray, qdd: FloatArray, smooth: bool
     ) -> tuple[FloatArray, FloatArray]:
-        """Evaluate whitened columns of all parameters and constants, each instant by itself, and the torques."""
+        """Evaluate whitened columns of parameters and constants, each instant by itself, and the torques."""
         model, theta = self.model, self.reference.theta
         sign = np.tanh(drive_velocity(model.robot, qd) / self.smooth_speed[:, None]) if smooth else None
         columns, known = stacked_rows(model, q, qd, qdd, sign)

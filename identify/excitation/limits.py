@@ -81,18 +81,22 @@ def _check(robot: Robot, limits: MotionLimits) -> None:
         unit = "m" if joint.prismatic else "rad"
         if span < _SMALLEST_SPAN:
             raise DesignError(
-                f"Joint '{joint.name}' may move over {span:.3g} {unit} only (limits {joint.limits.lower:g} to "
-                f"{joint.limits.upper:g} {unit}): no motion fits; widen its limits in the URDF, or make the joint fixed."
+                f"Joint '{joint.name}' may move over {span:.3g} {unit} only (limits "
+                f"{joint.limits.lower:g} to "
+                f"{joint.limits.upper:g} {unit}): no motion fits; widen its limits in the URDF, "
+                "or make the joint fixed."
             )
         for key, per in (("velocity", "s"), ("acceleration", "s2")):
             value = getattr(limits, key)[k]
             if value <= 0.0:
                 raise DesignError(
-                    f"Joint '{joint.name}' has the {key} limit {value:g} {unit}/{per}, which allows no motion; "
+                    f"Joint '{joint.name}' has the {key} limit {value:g} {unit}/{per}, which allows "
+                    "no motion; "
                     "correct it in the URDF or robot file, or leave it out where there is none."
                 )
         if limits.effort[k] <= 0.0:
             raise DesignError(
-                f"Joint '{joint.name}' has the effort limit {limits.effort[k]:g} {joint.torque_unit}, which allows no "
+                f"Joint '{joint.name}' has the effort limit {limits.effort[k]:g} "
+                f"{joint.torque_unit}, which allows no "
                 "motion; correct it in the URDF, or leave it out where there is none."
             )

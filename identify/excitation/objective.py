@@ -81,7 +81,7 @@ class Problem:
         return value + torque_value + distance_value, gradient
 
     def _through_effects(self, x: FloatArray, sharpness: float, effects_bar: FloatArray) -> FloatArray:
-        """Share of the gradient through the effects' columns, which may look along time (delays, derivatives)."""
+        """Gradient through the effects' columns, which may look along time (delays, derivatives)."""
 
         def weighted(z: FloatArray) -> float:
             motion = smooth_motion(self.mapping, z, sharpness)

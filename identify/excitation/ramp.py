@@ -39,8 +39,8 @@ class Ramp:
             Phase time [s], rate [-], acceleration [1/s], each shape (N,).
 
         Source:
-            Quintic blend u^3 (10 - 15 u + 6 u^2): rate and its slope vanish at rest, rate one and slope zero on
-            the orbit, so that position, velocity and acceleration are continuous.
+            Quintic blend u^3 (10 - 15 u + 6 u^2): rate and its slope vanish at rest, rate one and slope zero
+            on the orbit, so that position, velocity and acceleration are continuous.
         """
         u = np.clip(t_s / self.duration_s, 0.0, 1.0)
         rate = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
@@ -77,7 +77,7 @@ def ramp_acceleration(series: FourierSeries, ramp: Ramp) -> FloatArray:
     step = t_s[1]
     both = [ramp.evaluate(series, t_s)[2], ramp.evaluate_out(series, t_s)[2]]
     values = np.concatenate(both, axis=1)
-    # |d qdd/dt| <= |q'''| + 3 |q''| |slope| + |q'| |curvature| with slope <= 1.875 / T, curvature <= 5.7736 / T^2
+    # |d qdd/dt| <= |q'''| + 3 |q''| |slope| + |q'| |curvature|; slope <= 1.875 / T, curvature <= 5.7736 / T^2
     t = ramp.duration_s
     jerk = series.amplitude(3) + 3.0 * series.amplitude(2) * 1.875 / t + series.amplitude(1) * 5.7736 / t**2
     return np.abs(values).max(axis=1) + 0.5 * step * jerk
@@ -103,6 +103,7 @@ def shortest_ramp(series: FourierSeries, limits: MotionLimits) -> Ramp:
             return ramp
     worst = int(np.argmax(peak / limits.acceleration))
     raise DesignError(
-        f"Starting from rest within {ramp.duration_s:g} s would accelerate joint {worst + 1} by {peak[worst]:.4g}, above its "
+        f"Starting from rest within {ramp.duration_s:g} s would accelerate joint "
+        f"{worst + 1} by {peak[worst]:.4g}, above its "
         f"limit {limits.acceleration[worst]:.4g}; leave the limits a smaller share."
     )

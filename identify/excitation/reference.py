@@ -158,7 +158,8 @@ def reference_from_estimate(model: Model, values: Mapping[str, float], where: st
     missing = [p.name for p in model.parameters if p.name not in values and p.group != "plate"]
     if missing:
         raise DesignError(
-            f"The estimate {where} lacks {len(missing)} of the {len(model.parameters)} parameters of this robot's "
+            f"The estimate {where} lacks {len(missing)} of the {len(model.parameters)} "
+            "parameters of this robot's "
             f"{model.kind} model, first '{missing[0]}'; give an estimate of the same robot file and model."
         )
     theta = np.array([values.get(p.name, 0.0) for p in model.parameters])

@@ -114,7 +114,8 @@ def _check(robot: Robot, name: str, value: FloatArray, limit: FloatArray) -> Non
     worst = int(np.argmax(excess))
     if excess[worst] > _TOLERANCE * max(1.0, abs(limit[worst])):
         raise DesignError(
-            f"The {name} of joint '{robot.joints[worst].name}' would reach {value[worst]:.6g}, but {limit[worst]:.6g} is "
+            f"The {name} of joint '{robot.joints[worst].name}' would reach "
+            f"{value[worst]:.6g}, but {limit[worst]:.6g} is "
             "the limit; leave the limits a smaller share."
         )
 

@@ -243,7 +243,8 @@ def check_workspace(robot: Robot, workspace: Workspace) -> None:
     for sphere in workspace.spheres:
         if not -1 <= sphere.link < robot.n:
             raise DesignError(
-                f"Sphere '{sphere.name}' sits on link {sphere.link}, but the robot has links 0 to {robot.n - 1}."
+                f"Sphere '{sphere.name}' sits on link {sphere.link}, but the robot has links 0 "
+                f"to {robot.n - 1}."
             )
         if sphere.radius_m < 0.0:
             raise DesignError(

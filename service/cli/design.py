@@ -155,7 +155,8 @@ def _print(result: Design, output: Path) -> None:
         )
     console.print(table)
     console.print(
-        f"log det of the covariance {result.expected.log_det_covariance:.1f} (drawn by hand {result.plain.log_det_covariance:.1f}), "
+        f"log det of the covariance {result.expected.log_det_covariance:.1f} (drawn by "
+        f"hand {result.plain.log_det_covariance:.1f}), "
         f"condition {result.expected.condition_number:.4g} ({result.plain.condition_number:.4g})",
         markup=False,
     )

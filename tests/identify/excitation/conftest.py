@@ -9,6 +9,8 @@ from identify.excitation.design import DesignOptions, design, prepare
 from identify.excitation.series import FourierSeries
 from identify.robot import Drive, ForcePlate, Joint, Limits, Robot
 
+DRIVE = {"torque_constant": 0.2, "gear_ratio": 100.0}
+
 
 def joint(name, xyz, axis, limits, **drive):
     return Joint(
@@ -22,8 +24,8 @@ def two_axes():
     return Robot(
         "two",
         (
-            joint("yaw", (0, 0, 0.5), (0, 0, 1.0), Limits(-1.5, 1.5, 1.2, 5.0, 200.0), torque_constant=0.2, gear_ratio=100.0),
-            joint("pitch", (0, 0, 0.1), (0, 1.0, 0), Limits(-0.8, 1.0, 1.0, 4.0, 300.0), torque_constant=0.2, gear_ratio=90.0),
+            joint("yaw", (0, 0, 0.5), (0, 0, 1.0), Limits(-1.5, 1.5, 1.2, 5.0, 200.0), **DRIVE),
+            joint("pitch", (0, 0, 0.1), (0, 1.0, 0), Limits(-0.8, 1.0, 1.0, 4.0, 300.0), **DRIVE),
         ),
         plate=ForcePlate(),
     )  # fmt: skip

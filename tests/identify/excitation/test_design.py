@@ -6,7 +6,7 @@ import pytest
 
 from identify.errors import ModelError
 from identify.excitation import search
-from identify.excitation.design import DesignOptions, design, prepare
+from identify.excitation.design import design, prepare
 from identify.excitation.errors import DesignError
 from identify.excitation.reference import reference_from_description
 from identify.excitation.verify import verify

@@ -84,13 +84,17 @@ def test_impossible_floor_names_its_number(two_axes):
 
 
 def test_spheres_of_a_urdf_and_pairs():
-    chain_text = """<robot name="r"><link name="b"><collision><geometry><sphere radius="0.2"/></geometry></collision></link>
-    <link name="l1"><collision><origin xyz="0 0 0.1"/><geometry><sphere radius="0.1"/></geometry></collision></link>
+    chain_text = """<robot name="r">
+    <link name="b"><collision><geometry><sphere radius="0.2"/></geometry></collision></link>
+    <link name="l1"><collision>
+    <origin xyz="0 0 0.1"/><geometry><sphere radius="0.1"/></geometry></collision></link>
     <link name="l2"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
     <link name="f"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
     <joint name="j1" type="continuous"><parent link="b"/><child link="l1"/><axis xyz="0 0 1"/></joint>
-    <joint name="j2" type="continuous"><parent link="l1"/><child link="l2"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/></joint>
-    <joint name="j3" type="fixed"><parent link="l2"/><child link="f"/><origin xyz="0 0 0.5"/></joint></robot>"""
+    <joint name="j2" type="continuous"><parent link="l1"/><child link="l2"/>
+    <origin xyz="0 0 1"/><axis xyz="0 1 0"/></joint>
+    <joint name="j3" type="fixed"><parent link="l2"/><child link="f"/>
+    <origin xyz="0 0 0.5"/></joint></robot>"""
     spheres = urdf_spheres(chain_text, read_urdf(chain_text))
     assert [(s.link, s.radius_m, s.name) for s in spheres] == [(-1, 0.2, "b"), (0, 0.1, "l1"), (1, 0.05, "f")]
     np.testing.assert_allclose(spheres[2].center_m, [0, 0, 0.5])
