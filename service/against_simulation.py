@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -71,12 +72,17 @@ def against_simulation(diagnosis: Diagnosis, fit: Fit, loaded: LoadedRobot, simu
         },
         "effects": effects,
         "changes": [
-            {"effect": c.effect, "joint": c.joint, "p_value": c.p_value, "sentence": c.sentence.replace("the reference", "the simulation")}
+            {"effect": c.effect, "joint": c.joint, "p_value": c.p_value, "sentence": _of_simulation(c.sentence)}
             for c in changes
         ],
         "p_value": compared.p_value,
         "parameters": _parameters(fit, here, there),
     }
+
+
+def _of_simulation(sentence: str) -> str:
+    """A simulator has no worn brakes: the guess at a cause is left out."""
+    return re.sub(r" \([^()]*\)\.$", ".", sentence).replace("the reference", "the simulation")
 
 
 def _parameters(fit: Fit, here: State, there: State) -> list[dict[str, Any]]:

@@ -14,7 +14,8 @@ from identify.diagnosis.problem import Problem
 from identify.errors import NotPeriodicError
 from identify.fit import Fit
 from identify.fourier import FourierTrajectory, fit_trajectory
-from identify.free_motion import FreeOptions, free_rows
+from identify.free_motion import FreeOptions, FreeRows, free_rows
+from identify.friction import drive_velocity
 from identify.ordinary import unit_noise
 from identify.period import PeriodWindow, find_window
 from identify.rotations import FloatArray
@@ -23,6 +24,7 @@ from identify.solve import refine
 
 _SAME_MOTION = 0.01  # of a joint's range: closer paths count as one and the samples are subtracted directly
 _GRID = 512
+_SLOW = 0.02  # of a drive's top speed: below it a simulation is taken to stand or turn
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,18 @@ def _rows(fit: Fit, data: Dataset) -> _Rows:
             pass
     bandwidth = fit.motion.bandwidth_hz if fit.motion is not None else None
     formed = free_rows(fit.model, data, FreeOptions(bandwidth))
-    return _Rows((formed.block,), None, None, formed.motion)
+    return _Rows((_moving(fit, formed),), None, None, formed.motion)
+
+
+def _moving(fit: Fit, formed: FreeRows) -> Block:
+    """Leave out drives that stand: a noise-free simulation tells a direction where friction has none."""
+    robot, block = fit.model.robot, formed.block
+    speed = np.abs(formed.thinning.pick(drive_velocity(robot, formed.motion.qd)))
+    usable = np.array(block.usable)
+    for k, joint in enumerate(block.joint):
+        if joint >= 0 and robot.joints[joint].drive.friction:
+            usable[k] &= speed[joint] > _SLOW * speed[joint].max(initial=0.0)
+    return replace(block, usable=usable)
 
 
 def _shift(fit: Fit, rows: _Rows) -> float | None:
