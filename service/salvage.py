@@ -27,7 +27,7 @@ _NO_READING = 0
 def salvage_run(source: str | Path, output: str | Path) -> Recovery:
     """Save a broken log; complete it where it is an unfinished run of this program.
 
-    While a run lasts, its log holds the plate's raw samples only: their instants are known when all are there.
+    While a run lasts, its log holds the plate's raw samples only: their instants are known at its end.
 
     Args:
         source: the broken log.
@@ -47,7 +47,7 @@ def salvage_run(source: str | Path, output: str | Path) -> Recovery:
 
 
 def _addition(path: Path) -> Addition:
-    """What an unfinished run lacks, nothing for any other log."""
+    """What an unfinished run lacks; nothing for any other log."""
     try:
         recording = read_recording(path)
     except DaqError:

@@ -125,7 +125,7 @@ def open_bench(
 def virtual_bus(spec: PlantSpec, rate_hz: float) -> BusConfig:
     """The bus of a virtual robot: nodes 1, 2, ... in joint order."""
     axes = tuple(
-        AxisConfig(name=joint.name, node=index + 1, gear_ratio=joint.gear_ratio)
+        AxisConfig(name=joint.name, node=index + 1, gear_ratio=joint.gear_ratio, serial=index + 1)
         for index, joint in enumerate(spec.joints)
     )
     return BusConfig(axes=axes, rate_hz=rate_hz)
