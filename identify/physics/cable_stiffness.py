@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from identify.physics.effect import Coefficient, Effect, Place, every_revolute, only_joint
+from identify.physics.drives import revolute_drives
+from identify.physics.effect import Coefficient, Effect, Place, only_joint
 from identify.physics.scene import Scene
 from identify.rotations import FloatArray
 
@@ -22,7 +23,7 @@ EFFECT = Effect(
     parity="E",
     coefficients=(Coefficient("k", "N.m/rad"), Coefficient("k3", "N.m/rad3")),
     columns=_columns,
-    places=every_revolute,
+    places=revolute_drives,
     sentence="{place} is pulled back by a cable-like stiffness of {k} (cubic part {k3}).",
     reference="k (q - q0) + k3 (q - q0)^3; k q0 is part of the offset",
     constraint=lambda scene, place, values, shape: bool(

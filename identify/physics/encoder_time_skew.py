@@ -36,7 +36,7 @@ def _columns(scene: Scene, place: Place, shape: Mapping[str, float]) -> FloatArr
 
 def _agrees(scene: Scene, place: Place, values: FloatArray, shape: Mapping[str, float]) -> bool:
     """Friction must turn by about its whole self, and the smooth rows not move the other way."""
-    turns = 0.3 < values[1] < 1.7 or not _coulomb(scene).any()
+    turns = 0.6 < values[1] < 1.4 or not _coulomb(scene).any()
     return bool(turns and -0.5 < values[0] / (shape["late"] or 1e-6) < 4.0)
 
 

@@ -105,11 +105,11 @@ STEADY = [
     ("plate_time_skew", Place(), {"skew_s": 4e-3}, {}, [4e-3]),
     ("encoder_time_skew", Place(), {"skew_s": 4e-3}, {"late": 4e-3}, [4e-3, np.nan]),
     (
-        "encoder_eccentricity", Place(1), {"amplitude_rad": _E, "phase_rad": 0.5}, {},
+        "encoder_eccentricity", Place(1), {"amplitude_rad": _E, "phase_rad": 0.5}, {"turns": 0.0},
         [_E * np.cos(0.5), _E * np.sin(0.5)],
     ),
     (
-        "encoder_eccentricity", Place(0), {"amplitude_rad": _E, "phase_rad": 2.0}, {},
+        "encoder_eccentricity", Place(0), {"amplitude_rad": _E, "phase_rad": 2.0}, {"turns": 0.0},
         [_E * np.cos(2.0), _E * np.sin(2.0)],
     ),
 ]
@@ -263,6 +263,26 @@ def test_nothing_of_the_plate_is_tried_without_one():
             assert places == []
         for place in places:
             assert effect.columns(scene, place, _middle(effect)).shape[0] == scene.robot.n
+
+
+@pytest.mark.parametrize("turns", [0.0, 1.0])
+def test_an_eccentric_disk_moves_arm_and_motor(turns):
+    scene, effect = scene_of(null()), effect_named("encoder_eccentricity")
+    angle = (turns * scene.robot.motor_matrix[1] if turns else np.eye(3)[1]) @ scene.q
+    for k, wave in enumerate((np.sin(angle), np.cos(angle))):
+        misread = np.outer([0.0, 1.0, 0.0], wave)
+        column = effect.columns(scene, Place(1), {"turns": turns})[:, k]
+        expected = -scene.along(misread)  # time derivatives by the spectrum here, exact there
+        assert np.abs(column - expected).max() < 1e-3 * np.abs(expected).max()
+
+
+def test_a_late_encoder_turns_the_friction_between_true_and_read_reversal():
+    scene, late = scene_of(null()), 5e-3
+    column = effect_named("encoder_time_skew").columns(scene, Place(), {"late": late})[:, 1]
+    ahead = np.sign(delayed(scene, scene.speed, -late)) != scene.direction
+    assert ahead.any()
+    assert ((column[:3] != 0.0) == ahead).all()
+    assert not column[3:].any()
 
 
 def test_a_stated_spring_is_not_named_again():
