@@ -16,7 +16,9 @@ from service.datasets import dataset_of, open_recording
 from service.diagnosis_file import diagnosis_content
 from service.estimate_reading import Estimate, read_estimate
 from service.identification import robot_for, same_robot
+from service.held_out_checks import proven_only
 from service.robots import LoadedRobot
+from service.saturation import without_saturation
 
 _MCAP = b"\x89MCAP"
 
@@ -66,16 +68,21 @@ def diagnose_log(
     if validate_path is not None:
         recordings.append(open_recording(validate_path))
         same_robot(*recordings)
-    data = dataset_of(recordings[0], loaded)
+    cleaned = [without_saturation(recording) for recording in recordings]
+    clipped = tuple(warning for _, warnings in cleaned for warning in warnings)
+    data = dataset_of(cleaned[0][0], loaded)
     reference = None if against is None else _reference(against)
     if isinstance(reference, Estimate):
         fit_options = suitable(reference, loaded, fit_options or FitOptions(), data.wrench is not None)
     elif reference is not None:
         same_robot(recordings[0], reference)
     baseline = fit(loaded.robot, data, fit_options)
-    other = dataset_of(recordings[1], loaded) if len(recordings) > 1 else None
-    found, compared = _compared(diagnose(baseline, other, options), baseline, loaded, reference)
+    other = dataset_of(cleaned[1][0], loaded) if len(recordings) > 1 else None
+    found, strange = proven_only(diagnose(baseline, other, options), baseline, other)
+    found, compared = _compared(found, baseline, loaded, reference)
     content = diagnosis_content(found, baseline, loaded, recordings)
+    content["warnings"] = [*clipped, *(item.sentence for item in strange), *content["warnings"]]
+    content["fit"]["validation"]["rejected"] = [{"kind": item.kind, "sentence": item.sentence} for item in strange]
     content["against"] = compared
     return Diagnosed(loaded, recordings, baseline, found, content)
 

@@ -55,6 +55,8 @@ def _gain(content: dict[str, Any]) -> str:
     held = content["fit"]["validation"]
     intervals = held.get("gain_interval", {})
     proven = [c for c, (low, _) in ((c, v) for c, v in intervals.items() if None not in v) if low > 0]
+    if held.get("rejected") and not held["before"]:
+        return " The held-out recording could not serve as proof: see Before and after."
     if not held["before"]:
         return " No held-out recording was given to prove it on."
     if not proven:
