@@ -10,7 +10,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from identify.rotations import FloatArray
 
-CRITERIA = ("d", "a", "condition", "discriminating")
+CRITERIA = ("d", "a", "condition", "balanced", "discriminating")
 _POWER = 6.0  # of the smooth maximum over eigenvalues
 _RIDGE = 1e-13  # of the unit diagonal: lets a start without rank be evaluated and left
 
@@ -95,6 +95,30 @@ class ConditionNumber:
         gradient = by_unit * np.outer(scale, scale)
         gradient[np.diag_indices(len(scale))] -= np.sum(by_unit * unit, axis=1) * scale**2
         return float(value), gradient
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """Log determinant of the covariance plus a multiple of the log condition number.
+
+    Attributes:
+        columns: that the condition number is taken over; a gravity compensation's harmonics are left out,
+            since their likeness over the joint's range is the arm's and not the motion's.
+        weight: of the log condition number: 5 % less of it is worth about one nat.
+    """
+
+    columns: FloatArray
+    weight: float = 20.0
+    name: str = "balanced"
+
+    def __call__(self, information: FloatArray) -> tuple[float, FloatArray]:
+        """Give the value and its derivative by the matrix."""
+        block = np.ix_(self.columns, self.columns)
+        value, gradient = DOptimal()(information)
+        condition, by_block = ConditionNumber()(information[block])
+        gradient = gradient.copy()
+        gradient[block] += self.weight * by_block
+        return value + self.weight * condition, gradient
 
 
 def condition_number(information: FloatArray) -> float:

@@ -8,7 +8,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from identify.excitation.criteria import CRITERIA, AOptimal, ConditionNumber, Criterion, DOptimal
+from identify.excitation.criteria import (
+    CRITERIA,
+    AOptimal,
+    Balanced,
+    ConditionNumber,
+    Criterion,
+    DOptimal,
+)
 from identify.excitation.discriminate import Discriminating
 from identify.excitation.errors import DesignError
 from identify.excitation.expected import Expected, expected_quality, plain_series, variances_of
@@ -35,6 +42,7 @@ from identify.excitation.verify import Peaks, ramp_torques, verify
 from identify.excitation.workspace import Workspace, check_workspace
 from identify.model import Model, build_model
 from identify.robot import Robot
+from identify.rotations import FloatArray
 
 _GRID_PER_LINE = 16  # information grid points a line and period: finer changes log det by less than 0.01
 _FINE_PER_LINE = 40  # with effects: what happens near standstill needs more instants
@@ -72,7 +80,7 @@ class DesignOptions:
     periods: int = 16
     criterion: str = "d"
     seed: int = 0
-    starts: int = 6
+    starts: int = 5
     refined: int = 2
     share: float = 0.99
     workspace: Workspace = field(default_factory=Workspace)
@@ -181,6 +189,8 @@ def _criterion(
         return AOptimal(variances_of(problem, plain))
     if options.criterion == "condition":
         return ConditionNumber()
+    if options.criterion == "balanced":
+        return Balanced(_without_compensation(information))
     if options.criterion == "discriminating":
         return Discriminating(information.baseline, information.effect_columns)
     return DOptimal()
@@ -199,6 +209,12 @@ def _effects(model: Model, reference: ReferenceModel, options: DesignOptions) ->
         else catalogue_effect(model, reference, 1.0 / options.fundamental_hz, effect)
         for effect in options.effects
     )
+
+
+def _without_compensation(information: InformationModel) -> FloatArray:
+    groups = {p.name: p.group for p in information.model.parameters}
+    keep = [groups.get(name) != "gravity_compensation" for name in information.names]
+    return np.flatnonzero(keep)
 
 
 def prepare(robot: Robot, options: DesignOptions) -> Problem:

@@ -153,13 +153,17 @@ def _run(problem: Problem, x: FloatArray, stages: Iterable[tuple[float, float, i
     return finish(problem, x, evaluations, stopped)
 
 
+def _best_draw(problem: Problem, seed: int, start: int, sharpness: float) -> FloatArray:
+    rng = np.random.default_rng([seed, start])
+    draws = [problem.mapping.random(rng) for _ in range(_DRAWS)]
+    return min(draws, key=lambda x: problem.quick_value(x, sharpness))
+
+
 def explore(problem: Problem, seed: int, start: int, given: FloatArray | None = None) -> Candidate:
     """Optimise one start roughly: the best of some random motions, or a given one."""
     sharpness = _EXPLORE[0][0]
     if given is None:
-        rng = np.random.default_rng([seed, start])
-        draws = [problem.mapping.random(rng) for _ in range(_DRAWS)]
-        given = min(draws, key=lambda x: problem.quick_value(x, sharpness))
+        given = _best_draw(problem, seed, start, sharpness)
     return _run(problem, given, _EXPLORE)
 
 
@@ -217,7 +221,7 @@ def search(
         finals: list[tuple] = [(refine, problem, found[index].x) for index in order[:refined]]
         interrupted = _collect(found, len(tasks), finals, total, executor, progress)
     if not found:  # stopped before the first start was done
-        found[0] = finish(problem, problem.mapping.random(np.random.default_rng([seed, 0])))
+        found[0] = finish(problem, _best_draw(problem, seed, 0, _EXPLORE[0][0]))
     best = min(found.items(), key=lambda item: (item[1].value, item[0]))[1]
     return Outcome(best, sum(candidate.evaluations for candidate in found.values()), interrupted)
 

@@ -19,12 +19,12 @@ def design(
     fundamental: Annotated[float, typer.Option(help="Repetition rate [Hz].")] = 0.1,
     rate: Annotated[float, typer.Option(help="Sampling rate of the run [Hz].")] = 150.0,
     periods: Annotated[int, typer.Option(help="Periods the run will average.")] = 16,
-    criterion: Annotated[str, typer.Option(help="d, a, condition or discriminating.")] = "d",
+    criterion: Annotated[str, typer.Option(help="d, a, condition, balanced or discriminating.")] = "d",
     effect: Annotated[
         list[str] | None, typer.Option(help="NAME:JOINT to reveal or tell apart; repeat.")
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the random starts.")] = 0,
-    starts: Annotated[int, typer.Option(help="Number of random starts.")] = 6,
+    starts: Annotated[int, typer.Option(help="Number of random starts.")] = 5,
     share: Annotated[float, typer.Option(help="Part of every joint limit that may be used.")] = 0.99,
     workspace: Annotated[Path | None, typer.Option(help="Obstacles and bodies, a TOML file.")] = None,
     noise_from: Annotated[Path | None, typer.Option(help="Estimate whose noise levels to expect.")] = None,
@@ -124,34 +124,20 @@ def _print(result: Design, output: Path) -> None:
         style="bold",
         markup=False,
     )
-    table = Table(box=box.SIMPLE)
-    for heading in (
-        "joint",
-        "position",
-        "limit",
-        "velocity",
-        "limit",
-        "acceleration",
-        "limit",
-        "torque",
-        "limit",
-    ):
+    table = Table(box=box.SIMPLE, title="What is reached, and how much of the limit")
+    for heading in ("joint", "position", "velocity", "acceleration", "torque"):
         table.add_column(heading, justify="left" if heading == "joint" else "right", no_wrap=True)
     peaks, limits = result.peaks, result.limits
     for k, name in enumerate(result.joints):
-        numbers = [
-            peaks.velocity,
-            limits.velocity,
-            peaks.acceleration,
-            limits.acceleration,
-            peaks.effort,
-            limits.effort,
+        pairs = [
+            (getattr(peaks, key)[k], getattr(limits, key)[k])
+            for key in ("velocity", "acceleration", "effort")
         ]
+        span = (peaks.upper[k] - peaks.lower[k]) / (limits.upper[k] - limits.lower[k])
         table.add_row(
             name,
-            f"{peaks.lower[k]:.2f}..{peaks.upper[k]:.2f}",
-            f"{limits.lower[k]:.2f}..{limits.upper[k]:.2f}",
-            *(f"{values[k]:.3g}" for values in numbers),
+            f"{peaks.lower[k]:.2f}..{peaks.upper[k]:.2f} ({span:.0%})",
+            *(f"{value:.3g} ({value / limit:.0%})" for value, limit in pairs),
         )
     console.print(table)
     console.print(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identify.excitation.criteria import AOptimal, ConditionNumber, DOptimal, condition_number
+from identify.excitation.criteria import AOptimal, Balanced, ConditionNumber, DOptimal, condition_number
 from identify.excitation.discriminate import Discriminating, smallest_detectable
 
 
@@ -16,6 +16,7 @@ CRITERIA = (
     DOptimal(),
     AOptimal(np.array([1.0, 0.01, 3.0, 1.0, 1.0, 2.0])),
     ConditionNumber(),
+    Balanced(np.array([0, 1, 3, 4])),
     Discriminating(4, (np.array([4]), np.array([5]))),
     Discriminating(4, (np.array([4, 5]),)),
 )
