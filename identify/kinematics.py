@@ -33,20 +33,23 @@ class LinkMotion:
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross product of component-major vectors, shapes (3, N); np.cross is several times slower here."""
-    return np.stack(
-        (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    )
+    result = np.empty_like(a)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        np.multiply(a[i], b[j], out=result[k])
+        result[k] -= a[j] * b[i]
+    return result
 
 
 def rotate(rotation: FloatArray, vector: FloatArray) -> FloatArray:
     """Apply rotations (3, 3, N) to vectors (3, N) or to one vector (3,)."""
     if vector.ndim == 1:
-        return np.einsum("ijn,j->in", rotation, vector)
+        return rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
     return rotation[:, 0] * vector[0] + rotation[:, 1] * vector[1] + rotation[:, 2] * vector[2]
 
 
 def _compose(parent: FloatArray, fixed: FloatArray, turn: FloatArray | None) -> FloatArray:
-    placed = np.einsum("ijn,jk->ikn", parent, fixed)
+    # most frames are not turned at zero
+    placed = parent if np.array_equal(fixed, np.eye(3)) else np.einsum("ijn,jk->ikn", parent, fixed)
     if turn is None:
         return placed
     return np.stack([rotate(placed, turn[:, column]) for column in range(3)], axis=1)

@@ -52,27 +52,58 @@ def link_wrench_columns(motion: LinkMotion, gravity: FloatArray) -> tuple[FloatA
     force, moment = np.empty((3, 4, count)), np.empty((3, 10, count))
     force[:, 0], moment[:, 0] = a, cross(motion.origin_m, a)
     axes = motion.rotation
+    _apply(_first_moment_matrix(motion.omega, motion.alpha), axes, force[:, 1:])
     for k in range(3):
-        e = axes[:, k]
-        force[:, 1 + k] = cross(motion.alpha, e) + cross(motion.omega, cross(motion.omega, e))
-        moment[:, 1 + k] = cross(e, a) + cross(motion.origin_m, force[:, 1 + k])
-    w, al = _in_link(axes, motion.omega), _in_link(axes, motion.alpha)
-    for column, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-        moment[:, 4 + column] = rotate(axes, _inertia_column(w, al, i, j))
+        moment[:, 1 + k] = cross(axes[:, k], a)
+        moment[:, 1 + k] += cross(motion.origin_m, force[:, 1 + k])
+    _apply(axes, _inertia_columns(_in_link(axes, motion.omega), _in_link(axes, motion.alpha)), moment[:, 4:])
     return force, moment
+
+
+def _apply(matrix: FloatArray, columns: FloatArray, out: FloatArray) -> None:
+    """Multiply (3, 3, N) by columns (3, k, N) into ``out`` (3, k, N)."""
+    for row in range(3):
+        np.multiply(matrix[row, 0], columns[0], out=out[row])
+        out[row] += matrix[row, 1] * columns[1]
+        out[row] += matrix[row, 2] * columns[2]
+
+
+def _dot(vector: FloatArray, columns: FloatArray, out: FloatArray) -> FloatArray:
+    """Scalar products of (3, N) with columns (3, k, N), written into ``out`` (k, N)."""
+    np.multiply(vector[0], columns[0], out=out)
+    out += vector[1] * columns[1]
+    out += vector[2] * columns[2]
+    return out
+
+
+def _first_moment_matrix(w: FloatArray, al: FloatArray) -> FloatArray:
+    """Matrix S with S c = alpha x c + w x (w x c), shape (3, 3, N)."""
+    xx, yy, zz = w * w
+    xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
+    return np.array(
+        [
+            [-yy - zz, xy - al[2], xz + al[1]],
+            [xy + al[2], -xx - zz, yz - al[0]],
+            [xz - al[1], yz + al[0], -xx - yy],
+        ]
+    )
 
 
 def _in_link(rotation: FloatArray, vector: FloatArray) -> FloatArray:
     return rotation[0] * vector[0] + rotation[1] * vector[1] + rotation[2] * vector[2]
 
 
-def _inertia_column(w: FloatArray, al: FloatArray, i: int, j: int) -> FloatArray:
-    """Moment of a unit inertia component (i, j): E alpha + w x (E w), E its symmetric unit matrix."""
-    e_alpha, e_w = np.zeros_like(w), np.zeros_like(w)
-    e_alpha[i], e_w[i] = al[j], w[j]
-    if i != j:
-        e_alpha[j], e_w[j] = al[i], w[i]
-    return e_alpha + cross(w, e_w)
+def _inertia_columns(w: FloatArray, al: FloatArray) -> FloatArray:
+    """Moments I alpha + w x I w of unit inertia components xx, xy, xz, yy, yz, zz, shape (3, 6, N)."""
+    xx, yy, zz = w * w
+    xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
+    return np.array(
+        [
+            [al[0], al[1] - xz, al[2] + xy, -yz, yy - zz, yz],
+            [xz, al[0] + yz, zz - xx, al[1], al[2] - xy, -xz],
+            [-xy, xx - yy, al[0] - yz, xy, al[1] + xz, al[2]],
+        ]
+    )
 
 
 def rigid_columns(
@@ -124,10 +155,10 @@ def _project(
 ) -> None:
     """Project a distal link's wrench on a joint's axis: z . M + (p x z) . F, or z . F when it slides."""
     if robot.joints[joint].prismatic:
-        np.einsum("in,ijn->jn", motion.axis, force, out=out[:4])
+        _dot(motion.axis, force, out[:4])
         return
-    np.einsum("in,ijn->jn", motion.axis, moment, out=out)
-    out[:4] += np.einsum("in,ijn->jn", cross(motion.origin_m, motion.axis), force)
+    _dot(motion.axis, moment, out)
+    out[:4] += _dot(cross(motion.origin_m, motion.axis), force, np.empty_like(force[0]))
 
 
 def _place_on_plate(robot: Robot, force: FloatArray, moment: FloatArray, out: FloatArray) -> None:
