@@ -74,8 +74,9 @@ def peaks(limits: Limits, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> tup
     found = []
     for j, joint in enumerate(limits.joints):
         low, high = float(q[:, j].min()), float(q[:, j].max())
-        found.append(Peak(joint, "position", low, float(limits.lower[j]), low >= limits.lower[j]))
-        found.append(Peak(joint, "position", high, float(limits.upper[j]), high <= limits.upper[j]))
+        lower, upper = float(limits.lower[j]), float(limits.upper[j])
+        found.append(Peak(joint, "position", low, lower, low >= lower))
+        found.append(Peak(joint, "position", high, upper, high <= upper))
         rates = (("velocity", qd, limits.velocity), ("acceleration", qdd, limits.acceleration))
         for name, values, bound in rates:
             value = float(np.abs(values[:, j]).max())
