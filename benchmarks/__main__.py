@@ -1,4 +1,4 @@
-"""Runs every benchmark and prints its figures: ``make bench``, or ``.venv/bin/python -m benchmarks [NAME ...]``."""
+"""Runs every benchmark and prints its figures: ``make bench``, or ``python -m benchmarks [NAME ...]``."""
 
 import importlib
 import sys

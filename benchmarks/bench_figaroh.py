@@ -1,8 +1,8 @@
 """24 000 samples of six joints: regressor, base parameters, weighted estimate and std, against FIGAROH 1.0.2.
 
-Times are of the processor, one thread. Run: ``FIGAROH_PYTHON=/path/to/python .venv/bin/python -m benchmarks.bench_figaroh``, where that interpreter has
-figaroh 1.0.2 (its own virtual environment: its pins differ from ours). FIGAROH's estimate is the unweighted one;
-its weighted one builds a dense matrix of rows times rows, 154 GiB here.
+Run: ``FIGAROH_PYTHON=/path/to/python python -m benchmarks.bench_figaroh``, where that interpreter has figaroh
+1.0.2 (its own virtual environment: its pins differ from ours). Times are of the processor, one thread. FIGAROH's
+estimate is the unweighted one; its weighted one builds a dense matrix of rows times rows, 154 GiB here.
 """
 
 import os
@@ -117,14 +117,16 @@ def main():
     motions = make_motions(robot, SAMPLES)
     seconds, solution = timed(ours, robot, *motions)
     print(
-        f"ours: {seconds:.3f} s for {SAMPLES} samples of {JOINTS} joints, {solution.rank} parameters, weighted, with std"
+        f"ours: {seconds:.3f} s for {SAMPLES} samples of {JOINTS} joints, {solution.rank} parameters, "
+        "weighted, with std"
     )
     theirs, base = figaroh(text, motions)
     if theirs is None:
         print(f"FIGAROH skipped: {base}")
     else:
         print(
-            f"FIGAROH 1.0.2: {theirs:.3f} s, {base} parameters, unweighted, with std; ratio {theirs / seconds:.1f}"
+            f"FIGAROH 1.0.2: {theirs:.3f} s, {base} parameters, unweighted, with std; "
+            f"ratio {theirs / seconds:.1f}"
         )
     peaks = memory_per_sample(robot)
     print(

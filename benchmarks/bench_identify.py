@@ -36,7 +36,8 @@ def main():
             times.append((time.perf_counter() - start, time.process_time() - cpu))
         wall, busy = np.median(times, axis=0)
         print(
-            f"identify, 16 periods of 10 s, 3 axes, combined, log to estimate.json: {wall:.2f} s ({busy:.2f} s of processor)"
+            "identify, 16 periods of 10 s, 3 axes, combined, log to estimate.json: "
+            f"{wall:.2f} s ({busy:.2f} s of processor)"
         )
         peaks = {}
         for periods in (4, 8, 16):

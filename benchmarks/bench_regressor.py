@@ -1,7 +1,7 @@
 """Regressors of joint torques and base wrench against a loop over Pinocchio, in one run.
 
-Run: ``.venv/bin/python -m benchmarks.bench_regressor``. Pinocchio (``pip install pin``) is no dependency; without it
-only our own times are printed.
+Run: ``python -m benchmarks.bench_regressor``. Pinocchio (``pip install pin``) is no dependency; without it only
+our own times are printed. Times are of the processor, one thread.
 """
 
 import time
@@ -67,9 +67,8 @@ def main():
                 if theirs is None
                 else f"Pinocchio loop {theirs:.3f} s, ratio {theirs / seconds:.1f}"
             )
-            print(
-                f"{robot.n} joints{' and base wrench' if external else '':16}, {SAMPLES} samples: ours {seconds:.3f} s; {peer}"
-            )
+            what = f"{robot.n} joints{' and base wrench' if external else ''}"
+            print(f"{what:24} {SAMPLES} samples: ours {seconds:.3f} s; {peer}")
 
 
 if __name__ == "__main__":

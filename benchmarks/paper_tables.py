@@ -1,8 +1,8 @@
 """Tables 1 to 4 of Verdonck, Swevers, Samin (2001) on the virtual robot, printed beside the paper's numbers.
 
-Run: ``.venv/bin/python -m benchmarks.paper_tables``. The robot, its noise, 16 periods at 0.1 Hz with 5
-harmonics and the 20 random points with full stops are the paper's; the arm's true inertias are not known, so patterns
-are compared, not values.
+Run: ``python -m benchmarks.paper_tables``. The robot, its noise, 16 periods at 0.1 Hz with 5 harmonics and the
+20 random points with full stops are the paper's; the arm's true inertias are not known, so patterns are compared,
+not values.
 """
 
 from dataclasses import replace
@@ -106,7 +106,7 @@ def tables_2_and_3(structure, runs_averaged=8):
                 sums.setdefault((kind, channel), []).append(rms**2)
     rms = {key: float(np.sqrt(np.mean(values))) for key, values in sums.items()}
     print(
-        f"\nTable 2: torque prediction error on 20 random points [N.m], rms over {runs_averaged} training runs, "
+        f"\nTable 2: torque prediction error on 20 random points [N.m], rms over {runs_averaged} runs, "
         "sensors without noise; the paper's hold its sensors' noise and unmodelled friction"
     )
     for kind in ("internal", "combined"):
@@ -147,7 +147,8 @@ def table_4(structure, runs_averaged=4):
             rms = validate(f, held_out).rms
             sums[name].append([rms[joint] ** 2 for joint in JOINTS])
     print(
-        f"\nTable 4: torque prediction error [N.m] after training with either differentiation, {runs_averaged} runs"
+        "\nTable 4: torque prediction error [N.m] after training with either differentiation, "
+        f"{runs_averaged} runs"
     )
     both = {name: np.sqrt(np.mean(values, axis=0)) for name, values in sums.items()}
     for name, paper in (("analytic", PAPER_TORQUE["combined"]), ("numerical", PAPER_NUMERICAL)):
