@@ -1,8 +1,9 @@
 """24 000 samples of six joints: regressor, base parameters, weighted estimate and std, against FIGAROH 1.0.2.
 
-Run: ``FIGAROH_PYTHON=/path/to/python python -m benchmarks.bench_figaroh``, where that interpreter has figaroh
-1.0.2 (its own virtual environment: its pins differ from ours). Times are of the processor, one thread. FIGAROH's
-estimate is the unweighted one; its weighted one builds a dense matrix of rows times rows, 154 GiB here.
+Run: ``FIGAROH_PYTHON=/path/to/python python -m benchmarks.bench_figaroh``, where that interpreter has
+figaroh 1.0.2 (its own virtual environment: its pins differ from ours). Times are of the processor, one
+thread. FIGAROH's estimate is the unweighted one; its weighted one builds a dense matrix of rows times rows,
+154 GiB here.
 """
 
 import os

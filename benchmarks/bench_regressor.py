@@ -1,7 +1,7 @@
 """Regressors of joint torques and base wrench against a loop over Pinocchio, in one run.
 
-Run: ``python -m benchmarks.bench_regressor``. Pinocchio (``pip install pin``) is no dependency; without it only
-our own times are printed. Times are of the processor, one thread.
+Run: ``python -m benchmarks.bench_regressor``. Pinocchio (``pip install pin``) is no dependency; without it
+only our own times are printed. Times are of the processor, one thread.
 """
 
 import time

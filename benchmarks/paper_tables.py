@@ -1,8 +1,8 @@
 """Tables 1 to 4 of Verdonck, Swevers, Samin (2001) on the virtual robot, printed beside the paper's numbers.
 
-Run: ``python -m benchmarks.paper_tables``. The robot, its noise, 16 periods at 0.1 Hz with 5 harmonics and the
-20 random points with full stops are the paper's; the arm's true inertias are not known, so patterns are compared,
-not values.
+Run: ``python -m benchmarks.paper_tables``. The robot, its noise, 16 periods at 0.1 Hz with 5 harmonics and
+the 20 random points with full stops are the paper's; the arm's true inertias are not known, so patterns are
+compared, not values.
 """
 
 from dataclasses import replace
