@@ -123,7 +123,7 @@ def augment(problem: Problem, trials: list[Trial]) -> Augmented:
         The joint fit; without effects simply the baseline.
     """
     members = [_Member(t.effect, t.place, sorted(int(k) for k in t.kept), t.values.copy(), dict(t.shape)) for t in trials]
-    base = problem.fit.solution.jacobian
+    base = problem.jacobian
     for _ in range(_ITERATIONS):
         matrix, parts = _joint(problem, members, base)
         solution, covariance = _solve(matrix, problem.residual)
@@ -134,6 +134,12 @@ def augment(problem: Problem, trials: list[Trial]) -> Augmented:
     _advance(members, parts, solution, base.shape[1], move=False)
     rest = problem.residual - matrix @ solution
     return _result(problem, members, parts, matrix, solution, covariance, rest)
+
+
+def _without_extra(covariance: FloatArray, base: int, whole: int) -> FloatArray:
+    """Leave the nuisance columns of a diagnosis out of a joint covariance."""
+    keep = np.r_[0:base, whole : len(covariance)]
+    return covariance[np.ix_(keep, keep)]
 
 
 def unaugmented(fit: Fit) -> Augmented:
@@ -184,10 +190,11 @@ def _result(
 ) -> Augmented:
     fit = problem.fit
     base, count = fit.solution.jacobian.shape[1], len(fit.model.parameters)
+    whole = problem.jacobian.shape[1]  # with what joined the baseline for this diagnosis
     scale = fit.solution.scale.copy()
     scale[fit.solution.free_scales] += solution[count:base]
     theta = np.where(fit.solution.identifiable[:count], fit.solution.theta + solution[:count], fit.solution.theta)
-    additions, names, first = [], [], base
+    additions, names, first = [], [], whole
     chi2 = float(rest @ rest)
     for member, (columns, tangents) in zip(members, parts, strict=True):
         own = slice(first, first + columns + tangents)
@@ -209,5 +216,5 @@ def _result(
         names += [f"{label}.{name}" for name in member.free_shapes]
         first = own.stop
     return Augmented(
-        theta, scale, covariance[:base, :base], tuple(additions), covariance[base:, base:], tuple(names), rest, chi2, covariance
+        theta, scale, covariance[:base, :base], tuple(additions), covariance[whole:, whole:], tuple(names), rest, chi2, _without_extra(covariance, base, whole)
     )

@@ -8,12 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from identify.diagnosis.describe import carrying_channels
 from identify.diagnosis.problem import Problem
 from identify.physics.effect import Effect, Place
 from identify.rotations import FloatArray
 
 # courses in time tried for what changes: a ramp, and approaches to a steady state with these time constants [runs]
 _TIME_CONSTANTS = (0.1, 0.3)
+_MOST = 3  # effects that change over one run
+_RIVAL_GAP = 6.0  # BIC difference below which the data do not decide
+_PRICE = 9.0  # of a parameter: the logarithm of the number of rows
+# time constants tried for what an effect lets die out after the start [runs]
+_SETTLING = (0.05, 0.1, 0.2, 0.4, 0.8, 2.0)
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,24 @@ class Progress:
     gain: float
     width: int
     p_value: float
+
+
+    def raw(self, problem: Problem) -> list[FloatArray]:
+        """What changes, on every block before whitening, each (c, k, B)."""
+        if self.effect.settling is not None:
+            return [problem.enter(k, self.effect.settling(scene, self.place)) for k, scene in enumerate(problem.scenes)]
+        return problem.raw_columns(self.effect, self.place, _middle(self.effect))
+
+    def channels(self, problem: Problem) -> tuple[str, ...]:
+        """Channels that carry the change, strongest first."""
+        return carrying_channels(problem, problem.whiten(self.raw(problem)) @ self.values)
+
+    def mean_columns(self, problem: Problem) -> FloatArray:
+        """What the change leaves in the mean over the periods: within a period it moves on, whitened (rows, k)."""
+        shaped = [
+            part * block.grid_s / block.grid_s[-1] for part, block in zip(self.raw(problem), problem.blocks, strict=True)
+        ]
+        return problem.whiten(shaped)
 
 
 @dataclass(frozen=True)
@@ -122,9 +146,27 @@ def progressive_tests(problem: Problem, effects: list[Effect]) -> list[Progress]
             for index, (name, tau, _) in enumerate(courses[0]):
                 fitted = _fit_course(problem, tables, raw, [block_courses[index][2] for block_courses in courses])
                 found.append(_physical(problem, effect, place, name, tau, *fitted))
+    found += _settling_tests(problem, tables, effects)
     count = len(found)
     corrected = [_with_p(item, min(1.0, count * float(stats.chi2.sf(item.gain, max(item.width, 1))))) for item in found]
     return sorted(corrected, key=lambda item: (item.p_value, -item.gain))
+
+
+def _settling_tests(problem: Problem, tables: list[FloatArray], effects: list[Effect]) -> list[Progress]:
+    """Test what effects let die out after the run's start, over time constants."""
+    window, found = problem.fit.window, []
+    assert window is not None
+    times = [np.arange(window.periods)[:, None] * window.period_s + b.grid_s[None, :] for b in problem.blocks]
+    span = window.periods * window.period_s
+    for effect in (item for item in effects if item.settling is not None):
+        for place in effect.places(problem.scene):
+            raw = [problem.enter(k, effect.settling(scene, place)) for k, scene in enumerate(problem.scenes)]
+            for share in _SETTLING:
+                courses = [np.exp(-t / (share * span)) for t in times]
+                courses = [g - g.mean(axis=0, keepdims=True) for g in courses]
+                values, std, gain, width = _fit_course(problem, tables, raw, courses)
+                found.append(Progress(effect, place, "settling", share * span, values, std, gain, width, 1.0))
+    return found
 
 
 def _middle(effect: Effect) -> Mapping[str, float]:
@@ -183,3 +225,30 @@ def foreign_tones(problem: Problem) -> list[ForeignTone]:
                 amplitude = 2.0 * np.abs(np.fft.rfft(series[k])[line]) / count
                 found.append(ForeignTone(channel, line / (window.periods * window.period_s), float(amplitude), p))
     return sorted(found, key=lambda tone: tone.p_value)
+
+
+def pick_progress(problem: Problem, effects: list[Effect], level: float) -> list[tuple[Progress, tuple[str, ...]]]:
+    """Pick the progressive effects that stand out, no two on a common channel, with those that look alike.
+
+    Args:
+        problem: the problem.
+        effects: the catalogue.
+        level: level of the whole family of progressive tests.
+
+    Returns:
+        At most three effects, each with the names of its rivals.
+    """
+    tests = [item for item in progressive_tests(problem, effects) if item.p_value <= level]
+    home = {id(item): set(item.channels(problem)) for item in tests}
+    result: list[tuple[Progress, tuple[str, ...]]] = []
+    while tests and len(result) < _MOST:
+        best = max(tests, key=lambda item: item.gain - _PRICE * item.width)
+        same = [t for t in tests if t is not best and home[id(t)] & home[id(best)]]
+        near = [
+            t.effect.name
+            for t in same
+            if t.effect.name != best.effect.name and t.gain > best.gain - _RIVAL_GAP - _PRICE * (best.width - t.width)
+        ]
+        result.append((best, tuple(dict.fromkeys(near))[:4]))
+        tests = [t for t in tests if t is not best and t not in same]
+    return result

@@ -11,18 +11,25 @@ from identify.blocks import residual
 from identify.dataset import Dataset
 from identify.diagnosis.adequacy import Adequacy, examine
 from identify.diagnosis.augmented import Augmented, augment
-from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, progressive_tests
+from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, pick_progress
 from identify.diagnosis.blind_spots import blind_spots, place_name
-from identify.diagnosis.candidates import log_chance
+from identify.diagnosis.candidates import all_trials, best_by_place, log_chance
 from identify.diagnosis.describe import carrying_channels, parameters_of, sentence_of, where_of
-from identify.diagnosis.findings import ChannelFit, Diagnosis, Finding, FoundParameter, Unexplained, Where, rounded
+from identify.diagnosis.findings import (
+    ChannelFit,
+    Diagnosis,
+    Finding,
+    FoundParameter,
+    Unexplained,
+    Where,
+    rounded,
+)
 from identify.diagnosis.held_out import held_out
 from identify.diagnosis.locate import locate
 from identify.diagnosis.problem import Problem, build_problem
-from identify.diagnosis.select import Named, Selection, backward, extend, rebased, select
+from identify.diagnosis.select import Named, Selection, backward, rebased, select
 from identify.fit import Fit
 from identify.physics.catalogue import catalogue
-from identify.physics.effect import Effect
 from identify.rotations import FloatArray
 
 # family-wise levels; together the chance that a recording of the model plus noise raises any alarm is 1 %
@@ -63,8 +70,9 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
     rng = np.random.default_rng(_SEED)
     effects = [e for e in catalogue().values() if options.effects is None or e.name in options.effects]
     problem = build_problem(fit)
-    progress = _progress(problem, effects, LEVEL_PROGRESS * options.level)
-    problem = _with_progress(problem, progress)
+    progress = pick_progress(problem, effects, LEVEL_PROGRESS * options.level)
+    if progress:
+        problem = replace(problem, extra=np.hstack([item.mean_columns(problem) for item, _ in progress]))
     selection = backward(problem, select(problem, effects, LEVEL_NAMED * options.level, rng), LEVEL_NAMED * options.level)
     selection, rest = _gate(problem, selection, options)
     augmented = augment(problem, [item.trial for item in selection.named])
@@ -93,52 +101,6 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
 
 def _warnings(fit: Fit) -> tuple[str, ...]:
     return tuple(w for w in fit.warnings if not w.startswith("The model does not fit"))
-
-
-def _progress(problem: Problem, effects: list[Effect], level: float) -> list[tuple[Progress, tuple[str, ...]]]:
-    """Progressive effects that stand out, one a joint or channel, with those that look alike."""
-    tests = [item for item in progressive_tests(problem, effects) if item.p_value <= level]
-    result: list[tuple[Progress, tuple[str, ...]]] = []
-    while tests and len(result) < 3:
-        best = max(tests, key=lambda item: item.gain - 9.0 * item.width)
-        same = [t for t in tests if t is not best and _overlap(problem, t, best)]
-        near = [t for t in same if t.effect.name != best.effect.name and t.gain > best.gain - 6.0 - 9.0 * (best.width - t.width)]
-        result.append((best, tuple(dict.fromkeys(t.effect.name for t in near))[:4]))
-        tests = [t for t in tests if t is not best and t not in same]
-    return result
-
-
-def _overlap(problem: Problem, first: Progress, second: Progress) -> bool:
-    """Whether two changes concern a common channel: then they may be one and the same."""
-
-    def channels(item: Progress) -> set[str]:
-        columns = problem.columns(item.effect, item.place, _grid_middle(item.effect))
-        return set(carrying_channels(problem, columns @ np.ones(columns.shape[1])))
-
-    return bool(channels(first) & channels(second))
-
-
-def _grid_middle(effect: Effect) -> dict[str, float]:
-    return {shape.name: shape.grid[len(shape.grid) // 2] for shape in effect.shapes}
-
-
-def _with_progress(problem: Problem, progress: list[tuple[Progress, tuple[str, ...]]]) -> Problem:
-    """Let the mean over the periods of what changes join the baseline: a ramp is a sawtooth of every period."""
-    if not progress:
-        return problem
-    columns = []
-    for item, _ in progress:
-        raw = problem.raw_columns(item.effect, item.place, _grid_middle(item.effect))
-        shaped = [part * block.grid_s / block.grid_s[-1] for part, block in zip(raw, problem.blocks, strict=True)]
-        columns.append(problem.whiten(shaped))
-    stacked = np.hstack(columns)
-    basis = extend(problem.basis, stacked)
-    solution = problem.fit.solution
-    rest = solution.whitened - basis @ (basis.T @ solution.whitened)
-    solution = replace(solution, whitened=rest, jacobian=np.hstack([solution.jacobian]))
-    changed = Problem(replace(problem.fit, solution=solution), problem.scenes)
-    changed.__dict__["basis"] = basis
-    return changed
 
 
 def _gate(problem: Problem, selection: Selection, options: DiagnoseOptions) -> tuple[Selection, Adequacy]:
@@ -185,50 +147,68 @@ def _constant_findings(problem: Problem, augmented: Augmented, rest: Adequacy, l
     free = fit.solution.free_scales
     dirty = {s.channel for s in rest.structures if s.p_value < LEVEL_REST}
     for column, joint in enumerate(free):
-        name = fit.model.robot.joints[joint].name
-        nominal = fit.model.robot.joints[joint].drive.torque_constant
-        if nominal is None or name in dirty or not fit.solution.identifiable[count + column]:
+        drive, name = fit.model.robot.joints[joint].drive, fit.model.robot.joints[joint].name
+        if drive.torque_constant is None or name in dirty or not fit.solution.identifiable[count + column]:
             continue
         scale, std = augmented.scale[joint], float(np.sqrt(augmented.baseline_covariance[count + column, count + column]))
         z = (scale - 1.0) / std
         p = float(min(1.0, len(free) * 2.0 * stats.norm.sf(abs(z))))
-        if p > level:
-            continue
-        value, value_std = 1.0 / scale - 1.0, std / scale**2
-        sentence = (
-            f"{name[0].upper() + name[1:]}'s torque constant is {nominal / scale:.4g} N.m/A, {100 * value:+.1f} % ± {100 * value_std:.1f} % "
-            f"from the robot file's {nominal:.4g} N.m/A."
-        )
-        parameters = (
-            FoundParameter("e", value, value_std, ""),
-            FoundParameter("torque_constant", nominal / scale, nominal * value_std, "N.m/A"),
-        )
-        result.append(
-            Finding("torque_constant_error", name, None, parameters, max(p, 1e-300), float(z**2), (), Where((name,), "the whole motion", ()), sentence)
-        )
+        if p <= level:
+            rivals = _constant_rivals(problem, count + column, joint, float(z**2))
+            result.append(_constant_finding(name, drive.torque_constant, scale, std, p, rivals))
     return tuple(result)
 
 
+def _constant_rivals(problem: Problem, column: int, joint: int, gain: float) -> tuple[str, ...]:
+    """Effects of that joint that would explain the same if its torque constant were the robot file's."""
+    held = Problem(problem.fit, problem.scenes, problem.extra, column)
+    effects = [e for e in catalogue().values() if e.where in ("I", "B")]
+    trials = all_trials(held, held.basis, held.residual, effects, {})
+    near = [t for t in best_by_place(trials) if t.place.joint == joint and t.penalised > gain - np.log(len(held.residual)) - 6.0]
+    return tuple(dict.fromkeys(t.effect.name for t in sorted(near, key=lambda t: -t.penalised)))[:4]
+
+
+def _constant_finding(name: str, nominal: float, scale: float, std: float, p: float, rivals: tuple[str, ...]) -> Finding:
+    value, value_std = 1.0 / scale - 1.0, std / scale**2
+    sentence = (
+        f"{name[0].upper() + name[1:]}'s torque constant is {nominal / scale:.4g} N.m/A, {100 * value:+.1f} % ± {100 * value_std:.1f} % "
+        f"from the robot file's {nominal:.4g} N.m/A."
+    )
+    parameters = (
+        FoundParameter("e", value, value_std, "1"),
+        FoundParameter("torque_constant", nominal / scale, nominal * value_std, "N.m/A"),
+    )
+    gain = float(((scale - 1.0) / std) ** 2)
+    where = Where((name,), "the whole motion", ())
+    return Finding("torque_constant_error", name, None, parameters, max(p, 1e-300), gain, rivals, where, sentence)
+
+
 def _progress_finding(problem: Problem, item: Progress, rivals: tuple[str, ...]) -> Finding:
-    window = problem.fit.window
-    assert window is not None
-    parameters = []
-    for coefficient, value, std in zip(item.effect.coefficients, item.values, item.std, strict=True):
-        unit = f"{coefficient.unit}/s" if item.course == "ramp" else coefficient.unit
-        parameters.append(FoundParameter(coefficient.name, float(value), float(std), unit))
-    if item.time_constant_s is not None:
-        parameters.append(FoundParameter("time_constant", item.time_constant_s, None, "s"))
+    parameters = _progress_parameters(item)
     joint = problem.scene.robot.joints[item.place.joint].name if item.place.joint is not None else None
     place = place_name(problem, item.place)
     course = "steadily over the run" if item.course == "ramp" else f"settling within about {item.time_constant_s:.3g} s"
     numbers = ", ".join(f"{p.name} {rounded(p.value, p.std)} {p.unit}" for p in parameters if p.name != "time_constant")
-    columns = problem.columns(item.effect, item.place, _grid_middle(item.effect))
-    channels = carrying_channels(problem, columns @ item.values)
     return Finding(
-        item.effect.name, joint, item.place.channel, tuple(parameters), max(item.p_value, 1e-300), item.gain, rivals,
-        Where(channels, "changing from period to period", ()),
+        item.effect.name, joint, item.place.channel, parameters, max(item.p_value, 1e-300), item.gain, rivals,
+        Where(item.channels(problem), "changing from period to period", ()),
         f"{place[0].upper() + place[1:]}: {item.effect.name.replace('_', ' ')}, {course}: {numbers}.",
     )
+
+
+def _progress_parameters(item: Progress) -> tuple[FoundParameter, ...]:
+    """What changes by how much; of an effect that only dies out, its pace."""
+    if item.effect.settling is not None:
+        assert item.time_constant_s is not None
+        name, unit = item.effect.coefficients[0].name, item.effect.unit
+        return (FoundParameter(name, 1.0 / item.time_constant_s, None, unit),)
+    result = [
+        FoundParameter(c.name, float(value), float(std), f"{c.unit}/s" if item.course == "ramp" else c.unit)
+        for c, value, std in zip(item.effect.coefficients, item.values, item.std, strict=True)
+    ]
+    if item.time_constant_s is not None:
+        result.append(FoundParameter("time_constant", item.time_constant_s, None, "s"))
+    return tuple(result)
 
 
 def _unexplained(problem: Problem, rest: Adequacy, tones: list[ForeignTone], options: DiagnoseOptions) -> Unexplained | None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import interpolate
 
-from identify.diagnosis.augmented import Augmented, unaugmented
 from identify.dataset import Dataset
+from identify.diagnosis.augmented import Augmented, unaugmented
 from identify.fit import Fit
 from identify.physics.scene import Scene
 from identify.robot import WRENCH_CHANNELS

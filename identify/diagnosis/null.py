@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from identify.diagnosis.candidates import Trial, log_chance
 from identify.rotations import FloatArray
 

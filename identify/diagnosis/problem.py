@@ -22,10 +22,15 @@ class Problem:
     Attributes:
         fit: the fit.
         scenes: one a block, on the block's grid (on the motion's grid for a non-periodic run).
+        extra: whitened columns that join the baseline, such as what changes over the run leaves in the mean
+            over the periods, shape (rows, e).
+        without: a column of the fit's Jacobian that leaves the baseline, to test what else could stand for it.
     """
 
     fit: Fit
     scenes: tuple[Scene, ...]
+    extra: FloatArray | None = None
+    without: int | None = None
 
     @property
     def blocks(self) -> tuple[Block, ...]:
@@ -37,15 +42,28 @@ class Problem:
         """The first block's scene: for places and names."""
         return self.scenes[0]
 
-    @property
+    @cached_property
     def residual(self) -> FloatArray:
         """Whitened residual of the baseline, shape (rows,)."""
-        return self.fit.solution.whitened
+        solution = self.fit.solution
+        rest = solution.whitened
+        if self.without is not None:  # back to the value the robot file states
+            column = self.without - len(self.fit.model.parameters)
+            rest = rest + solution.jacobian[:, self.without] * (solution.scale[solution.free_scales[column]] - 1.0)
+        return rest if self.extra is None and self.without is None else rest - self.basis @ (self.basis.T @ rest)
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Whitened columns of the baseline, shape (rows, P + k + e)."""
+        jacobian = self.fit.solution.jacobian
+        if self.without is not None:
+            jacobian = np.delete(jacobian, self.without, axis=1)
+        return jacobian if self.extra is None else np.hstack([jacobian, self.extra])
 
     @cached_property
     def basis(self) -> FloatArray:
         """Orthonormal basis of the baseline's whitened columns, shape (rows, rank)."""
-        jacobian = self.fit.solution.jacobian
+        jacobian = self.jacobian
         norms = np.linalg.norm(jacobian, axis=0)
         left, values, _ = np.linalg.svd(jacobian[:, norms > 0] / norms[norms > 0], full_matrices=False)
         return left[:, values > 1e-9 * values[0]]

@@ -84,6 +84,8 @@ class Effect:
         constraint: further physical constraint on the fitted values; a fit that violates it is not this effect.
         progressive: True where the effect is what changes over the run: the columns are then multiplied by a
             course in time (a ramp, or the approach to a steady state) instead of repeating every period.
+        settling: columns of what dies out exponentially after the run's start because of this effect, with one
+            time constant for all of them; None where nothing does.
     """
 
     name: str
@@ -97,6 +99,7 @@ class Effect:
     shapes: tuple[Shape, ...] = ()
     constraint: Constraint = _always
     progressive: bool = False
+    settling: Callable[[Scene, Place], FloatArray] | None = None
     size_of: Callable[[FloatArray, Mapping[str, float]], float] = field(default=lambda values, shape: float(np.linalg.norm(values)))
 
     @property

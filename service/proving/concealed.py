@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
 from daq.log_writer import write_recording
 from daq.recording import Recording
+from drivers.virtual.effects.effect import EffectSpec
+from drivers.virtual.effects.registry import effect_class
 from drivers.virtual.plant_file import PlantSpec, load_plant
 from drivers.virtual.record import record_virtual
 from drivers.virtual.robot_description import robot_attachments
-from drivers.virtual.trajectories import random_fourier, random_points
+from drivers.virtual.trajectories import FourierMotion, random_fourier, random_points
 from identify.fit import fit
 from service.datasets import dataset_of
 from service.errors import ServiceError
 from service.files import write_text
-from service.proving.scenario import Scenario, draw_scenario
+from service.proving.scenario import draw_scenario
 from service.robots import build_robot
 
+_STRENGTHS = (np.log(0.04), np.log(0.4))  # drawn evenly between these, in noise std left after the refit
+_STRENGTH_PERIODS = 3
 _QUIET = 0.05  # of the noise: the recording that measures how much of an effect the model cannot absorb
 
 
@@ -40,23 +44,46 @@ def _quieter(plant: PlantSpec) -> PlantSpec:
     return plant.model_copy(update={"noise": noise.model_copy(update=scaled)})
 
 
-def strength(plant: PlantSpec, trajectory: object, scenario: Scenario, periods: int) -> dict[str, float]:
-    """Measure what an effect leaves after the refit of the model, in units of the noise std, by channel.
+def strength(plant: PlantSpec, trajectory: FourierMotion, effect: EffectSpec, seed: int) -> float:
+    """Measure what an effect leaves after the refit of the plain model, in units of the noise std.
 
     A recording with a twentieth of the noise is fitted by the plain model; its averaged residual, less what
     that noise leaves, is the effect's.
+
+    Args:
+        plant: the virtual robot.
+        trajectory: its motion.
+        effect: the effect.
+        seed: of the noise.
+
+    Returns:
+        The largest over the channels.
     """
-    quiet = record_virtual(_quieter(plant), trajectory, periods, 1, scenario.seed + 1, scenario.effects)
+    quiet = record_virtual(_quieter(plant), trajectory, _STRENGTH_PERIODS, 1, seed, (effect,))
     files = robot_attachments(plant)
     urdf = next(text for name, text in files.items() if name.endswith(".urdf"))
     loaded = build_robot(files["robot.toml"].decode(), urdf.decode(), plant.name)
     result = fit(loaded.robot, dataset_of(quiet, loaded))
     noise = result.noise_std
-    left = {}
+    left = 0.0
     for channel, rms in result.residual_rms.items():
-        excess = max(rms**2 - noise[channel] ** 2 / periods, 0.0)
-        left[channel] = float(np.sqrt(excess) * _QUIET / max(noise[channel], 1e-300))
+        excess = max(rms**2 - noise[channel] ** 2 / _STRENGTH_PERIODS, 0.0)
+        left = max(left, float(np.sqrt(excess) * _QUIET / max(noise[channel], 1e-300)))
     return left
+
+
+def scaled(
+    plant: PlantSpec, trajectory: FourierMotion, effect: EffectSpec, seed: int, target: float
+) -> tuple[EffectSpec, float]:
+    """Scale an effect so that it leaves about the wanted strength, within sixfold of its usual size.
+
+    Effects that the model swallows stay at sixfold and weak; the strength returned is measured, not wanted.
+    """
+    size = effect_class(effect.name).size
+    first = strength(plant, trajectory, effect, seed)
+    factor = float(np.clip(target / max(first, 1e-6), 1.0 / 12.0, 6.0))
+    changed = replace(effect, parameters=dict(effect.parameters) | {size: effect.parameters[size] * factor})
+    return changed, strength(plant, trajectory, changed, seed)
 
 
 def conceal(folder: Path, robot: str, number: int, campaign_seed: int, periods: int) -> None:
@@ -75,7 +102,12 @@ def conceal(folder: Path, robot: str, number: int, campaign_seed: int, periods: 
     trial = folder / "trials" / f"{number:04d}"
     trial.mkdir(parents=True, exist_ok=True)
     trajectory = random_fourier(plant, scenario.seed)
-    answer = {"scenario": asdict(scenario), "strength": strength(plant, trajectory, scenario, periods)}
+    rng = np.random.default_rng([scenario.seed, 1])
+    pairs = [
+        scaled(plant, trajectory, effect, scenario.seed + 1, float(np.exp(rng.uniform(*_STRENGTHS)))) for effect in scenario.effects
+    ]
+    scenario = replace(scenario, effects=tuple(effect for effect, _ in pairs))
+    answer = {"scenario": asdict(scenario), "strength": [left for _, left in pairs]}
     text = json.dumps(answer, sort_keys=True)
     (folder / "sealed").mkdir(exist_ok=True)
     write_text(folder / "sealed" / f"{number:04d}.json", text, "the sealed answer")

@@ -64,4 +64,4 @@ def draw_scenario(plant: PlantSpec, number: int, campaign_seed: int) -> Scenario
 
 
 def _draw(plant: PlantSpec, name: str, rng: np.random.Generator) -> EffectSpec:
-    return draw_effect(plant, name, rng, size_factor=float(np.exp(rng.uniform(np.log(0.3), np.log(2.0)))))
+    return draw_effect(plant, name, rng, size_factor=1.0)

@@ -20,7 +20,7 @@ class Score:
         truth: concealed effects as ``name@place``.
         said: findings as ``name@place``.
         verdict: of the diagnosis.
-        strength: what the effects leave after the refit, largest over the channels, in noise std.
+        strength: what the weakest concealed effect leaves after the refit, in noise std.
         right: every concealed effect named at its place, or among the alternatives stated there.
         exact: the same without alternatives.
         extra: findings that are no concealed effect.
@@ -84,7 +84,7 @@ def score(answer: Mapping[str, Any], diagnosis: Mapping[str, Any], seconds: floa
         tuple(f"{effect['name']}@{_place(effect)}" for effect in scenario["effects"]),
         tuple(f"{item['effect']}@{item['joint'] or item['channel'] or 'robot'}" for item in findings),
         diagnosis["verdict"],
-        max(answer["strength"].values(), default=0.0) if scenario["effects"] else 0.0,
+        min(answer["strength"], default=0.0),
         right,
         exact,
         tuple(f"{item['effect']}@{item['joint'] or item['channel'] or 'robot'}" for item in extra),
