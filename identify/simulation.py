@@ -131,7 +131,7 @@ def recorded_motion(data: Dataset) -> tuple[SmoothMotion, bool]:
         whole = filtered.copy()
         whole[:, inside] = lines
         parts.append(whole)
-    return replace(motion, q=parts[0], qd=parts[1], qdd=parts[2]), True
+    return replace(motion, q=parts[0], qd=parts[1], qdd=parts[2], valid=motion.valid | inside), True
 
 
 def simulate(full: FullModel, data: Dataset) -> Simulated:

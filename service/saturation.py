@@ -9,8 +9,9 @@ import numpy as np
 from daq.recording import Recording, Stream
 from service.errors import LogError
 
-_RUN = 4  # samples in a row at the very same extreme: noise never does that, a clipped channel does
-_TIMES = 2  # such stretches
+_PILED = 4.0  # times as many samples as at the next value: a clipped channel piles up at its end, a peak does not
+_FEWEST = 8  # samples there
+_LEAST = 0.002  # and so much of the channel
 _TOO_MUCH = 0.25  # of a channel: what is left cannot speak for the motion
 _KEYS = ("current", "effort", "force", "torque")
 _STILL = 1e-9  # a channel that hardly moves is constant, not clipped
@@ -70,18 +71,16 @@ def _cleaned(stream: Stream | None, source: str) -> tuple[Stream | None, tuple[s
 
 
 def saturated(values: np.ndarray) -> tuple[np.ndarray, list[float]]:
-    """Find the samples of a channel (N,) that sit at an extreme in stretches; also those extremes."""
+    """Find the samples of a channel (N,) that pile up at an extreme; also those extremes."""
     marked, extremes = np.zeros(len(values), dtype=bool), []
     if np.ptp(values) <= _STILL * max(float(np.abs(values).max()), 1.0):
         return marked, extremes
-    for extreme in (float(values.max()), float(values.min())):
-        at = values == extreme
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(np.int8), [0]])))
-        starts, stops = edges[::2], edges[1::2]
-        long = (stops - starts) >= _RUN
-        if long.sum() >= _TIMES:
-            marked |= at
-            extremes.append(extreme)
+    levels, counts = np.unique(values, return_counts=True)
+    for end, following in ((-1, -2), (0, 1)):
+        piled = counts[end] >= max(_FEWEST, _LEAST * len(values))
+        if piled and counts[end] > _PILED * counts[following]:
+            marked |= values == levels[end]
+            extremes.append(float(levels[end]))
     return marked, extremes
 
 

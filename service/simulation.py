@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -66,7 +67,7 @@ def simulate_log(robot: str, model_path: str | Path, like_path: str | Path) -> S
         )
     notes += _left_out(like, found, estimate)
     made = _recording(like, estimate, full, found)
-    difference, level = _differences(like, made, estimate, full)
+    difference, level = _differences(like, made, found, full, estimate)
     return Simulation(
         made, like, difference, level, tuple(item.effect.name for item in full.effects), tuple(notes)
     )
@@ -164,29 +165,37 @@ def _attachments(like: Recording, estimate: Estimate) -> dict[str, bytes]:
 
 
 def _differences(
-    like: Recording, made: Recording, estimate: Estimate, full: FullModel
+    like: Recording, made: Recording, found: Simulated, full: FullModel, estimate: Estimate
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """RMS of recording less simulation and of the recording itself, by channel."""
-    names, joints = estimate.loaded.robot.joint_names, estimate.loaded.robot.joints
-    pairs: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    if made.motor_currents is not None and like.motor_currents is not None:
-        for k, name in enumerate(names):
-            factor = (joints[k].drive.torque_constant or 1.0) * joints[k].drive.gear_ratio / full.scale[k]
-            column = like.motor_currents.names.index(name)
-            pairs[name] = (
-                like.motor_currents.data["current"][:, column] * factor,
-                made.motor_currents.data["current"][:, k] * factor,
-            )
-    elif "effort" in made.joint_states.data:
-        for k, name in enumerate(names):
-            column = like.joint_states.names.index(name)
-            pairs[name] = (
-                like.joint_states.data["effort"][:, column],
-                made.joint_states.data["effort"][:, k],
-            )
+    """RMS of recording less simulation and of the recording itself, by channel, away from gaps and ends."""
+    difference, level = {}, {}
+    for name, stream, recorded, simulated in _pairs(like, made, full, estimate):
+        t_s = (stream.stamp_ns - like.joint_states.stamp_ns[0]) * 1e-9
+        sure = found.motion.valid_at(t_s)
+        if not sure.any():
+            continue
+        difference[name] = float(np.sqrt(np.mean((recorded - simulated)[sure] ** 2)))
+        level[name] = float(np.std(recorded[sure]))
+    return difference, level
+
+
+def _pairs(
+    like: Recording, made: Recording, full: FullModel, estimate: Estimate
+) -> Iterator[tuple[str, Stream, np.ndarray, np.ndarray]]:
+    """Channels of both recordings in N.m and N."""
+    for k, joint in enumerate(estimate.loaded.robot.joints):
+        for stream, other, key in (
+            (like.motor_currents, made.motor_currents, "current"),
+            (like.joint_states, made.joint_states, "effort"),
+        ):
+            if stream is None or other is None or key not in other.data:
+                continue
+            factor = (joint.drive.torque_constant or 1.0) * joint.drive.gear_ratio / full.scale[k]
+            factor = factor if key == "current" else 1.0
+            recorded = stream.data[key][:, stream.names.index(joint.name)]
+            yield joint.name, stream, recorded * factor, other.data[key][:, k] * factor
+            break
     if made.wrench is not None and like.wrench is not None:
         for k, channel in enumerate(WRENCH_CHANNELS):
             key = "force" if k < 3 else "torque"
-            pairs[channel] = (like.wrench.data[key][:, k % 3], made.wrench.data[key][:, k % 3])
-    difference = {name: float(np.sqrt(np.mean((a - b) ** 2))) for name, (a, b) in pairs.items()}
-    return difference, {name: float(np.std(a)) for name, (a, _) in pairs.items()}
+            yield channel, like.wrench, like.wrench.data[key][:, k % 3], made.wrench.data[key][:, k % 3]

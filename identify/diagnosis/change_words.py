@@ -51,9 +51,8 @@ def _constant_parameters(model: Model, change: NamedChange, reference: State) ->
     """Relative change of the constant, and where it was estimated its new value."""
     value, std = _number(change, 0)
     index = model.robot.joint_names.index(change.hypothesis.joint or "")
-    if change.hypothesis.names == ("e",):  # the torque for the same current grows by e: the constant falls by it
-        share = 1.0 / (1.0 + value)
-        return (FoundParameter("e", share - 1.0, std * share**2, ""),)
+    if change.hypothesis.names == ("e",):  # share of today's torque under the old constant that is too much
+        return (FoundParameter("e", -value, std, ""),)
     before = float(reference.values[len(model.parameters) + index])
     return (
         FoundParameter("e", value / before, std / before, ""),
