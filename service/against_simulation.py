@@ -45,7 +45,7 @@ def against_simulation(diagnosis: Diagnosis, fit: Fit, loaded: LoadedRobot, simu
         )
     if fit.model.kind != "external" and data.drive_signal is None:
         raise LogError(f"{simulation.source} has neither /motor_currents nor efforts to compare with; let the simulator log one of them.")
-    problem, augmented = diagnosis.model["problem"], diagnosis.model["augmented"]
+    problem, augmented = diagnosis.model.get("renewed", diagnosis.model["problem"]), diagnosis.model["augmented"]
     assert isinstance(problem, Problem)
     assert isinstance(augmented, Augmented)
     found = decompose(problem, augmented, data)

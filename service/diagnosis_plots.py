@@ -20,7 +20,7 @@ def _numbers(values: np.ndarray) -> list[float | None]:
 
 def curve_entries(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Measured residual against the model, for every finding that is part of the joint fit."""
-    problem, augmented = diagnosis.model["problem"], diagnosis.model["augmented"]
+    problem, augmented = diagnosis.model.get("renewed", diagnosis.model["problem"]), diagnosis.model["augmented"]
     assert isinstance(problem, Problem)
     assert isinstance(augmented, Augmented)
     return [
