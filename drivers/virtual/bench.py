@@ -122,10 +122,12 @@ def open_bench(
     return VirtualBench(robot, plant, fleet, segment, drives, plate, VirtualClock(segment))
 
 
-def virtual_bus(spec: PlantSpec, rate_hz: float) -> BusConfig:
+def virtual_bus(spec: PlantSpec, rate_hz: float, profile: str = "generic") -> BusConfig:
     """The bus of a virtual robot: nodes 1, 2, ... in joint order."""
     axes = tuple(
-        AxisConfig(name=joint.name, node=index + 1, gear_ratio=joint.gear_ratio, serial=index + 1)
+        AxisConfig(
+            name=joint.name, node=index + 1, gear_ratio=joint.gear_ratio, serial=index + 1, profile=profile
+        )
         for index, joint in enumerate(spec.joints)
     )
     return BusConfig(axes=axes, rate_hz=rate_hz)

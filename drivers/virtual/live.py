@@ -43,6 +43,7 @@ _RUNNING_NS = 100_000_000
 """SYNCs this recent mean that the robot moves and its future must be waited for."""
 
 _LONGEST_WAIT_S = 0.05
+_PATIENCE = 10.0  # heartbeats
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
@@ -58,6 +59,7 @@ class LiveSettings:
         start_q: joint angles (k,) at rest.
         faults: of bus and drives, counted from the first set point.
         plate_faults: of the plate, timed from the start of its stream.
+        profile: of the drives.
     """
 
     spec: PlantSpec
@@ -67,6 +69,13 @@ class LiveSettings:
     start_q: np.ndarray | None = None
     faults: tuple[Fault, ...] = ()
     plate_faults: tuple[PlateFault, ...] = field(default_factory=tuple)
+    profile: str = "generic"
+
+    @property
+    def bus(self) -> BusConfig:
+        """The bus that its drives are on; patient, because a busy machine stalls simulated drives too."""
+        bus = virtual_bus(self.spec, self.rate_hz, self.profile)
+        return bus.model_copy(update={"heartbeat_patience": _PATIENCE})
 
 
 class LiveLoad:
@@ -130,7 +139,7 @@ class LiveLab:
             plate_port = None
         if plate_port is None:
             raise LinkError("The virtual laboratory did not start; run the command again.")
-        self.drives = LiveDriveBus(virtual_bus(settings.spec, settings.rate_hz), SocketLink(ours), self)
+        self.drives = LiveDriveBus(settings.bus, SocketLink(ours), self)
         self.plate = SerialPlate(protocol_named("bota"), plate_port) if plate_port else None
 
     def arm(self, sync: int) -> None:
@@ -151,7 +160,7 @@ def _run(settings: LiveSettings, end: socket.socket, pipe: Connection) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     precedence()
     sys.setswitchinterval(5e-4)  # the plate's thread must not keep the drives waiting
-    spec, config = settings.spec, virtual_bus(settings.spec, settings.rate_hz)
+    spec, config = settings.spec, settings.bus
     robot = robot_on(spec, config, settings.seed, settings.effects, settings.start_q)
     plant = RobotPlant(robot)
     plan = FaultPlan(settings.faults)

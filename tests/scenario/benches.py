@@ -47,22 +47,23 @@ class Outcome:
         return self.report.causes[0]
 
 
-def make(path: Path, *faults: Fault, plate_faults=(), periods=3, limits_of_run=None, clock=None, **job):
-    """A run that is ready, and its bench."""
-    bench = open_bench(SPEC, seed=4, plan=FaultPlan(faults), plate_faults=plate_faults)
-    kept = limits_of_run or limits()
+def job(path: Path, foresee=lambda targets_rad: None, periods=3, limits_of_run=None, **changes) -> Job:
+    """The standard short motion."""
 
     def plan(start, period_s):
         made = plan_excitation(excitation(), limits(), start, period_s, periods, 1)
-        bench.drives.foresee(made.q)
+        foresee(made.q)
         return made
 
     metadata = {"schema_version": "1", "run_id": "test", "robot": "ir361", "simulated": "true"}
-    settings = {"path": path, "plan": plan, "limits": kept, "metadata": metadata, "patient": True}
-    run = Acquisition(
-        Job(**{**settings, **job}), bench.drives, clock or bench.clock, bench.plate, RunStatus()
-    )
-    return run, bench
+    return Job(path, plan, limits_of_run or limits(), metadata, patient=True, **changes)
+
+
+def make(path: Path, *faults: Fault, plate_faults=(), **settings):
+    """A run that is ready, and its bench."""
+    bench = open_bench(SPEC, seed=4, plan=FaultPlan(faults), plate_faults=plate_faults)
+    wanted = job(path, bench.drives.foresee, **settings)
+    return Acquisition(wanted, bench.drives, bench.clock, bench.plate, RunStatus()), bench
 
 
 def record(path: Path, *faults: Fault, **settings) -> Outcome:

@@ -19,7 +19,7 @@ from daq.raw_records import NO_CYCLE
 from service.salvage import salvage_run
 
 ROOT = Path(__file__).resolve().parents[2]
-RATE_HZ = 150.0
+RATE_HZ = 50.0  # slow: the machine that tests may be busy, and a run that fails by itself cannot be killed
 
 
 def write_excitation(path):
@@ -31,7 +31,7 @@ def write_excitation(path):
     return path
 
 
-def kill_at_random(folder, seed):
+def kill_at_random(folder, seed, tries=4):
     """Start a run, kill it some time after its first cycle; return its log and the last cycle it had."""
     log, (ours, theirs) = folder / f"{seed}.mcap", os.pipe()
     excitation = write_excitation(folder / f"{seed}.json")
@@ -49,20 +49,22 @@ def kill_at_random(folder, seed):
         told += chunk
     os.close(ours)
     assert told, complaint
+    if victim.returncode != -signal.SIGKILL or log.exists():  # it was over before: too many cycles missed
+        assert tries > 1, complaint
+        return kill_at_random(folder, seed + 1000, tries - 1)
     return log, struct.unpack("<i", told[-4:])[0]
 
 
 def check(folder, seed):
     log, last = kill_at_random(folder, seed)
     partial = Path(f"{log}.partial")
-    assert not log.exists()
     whole = folder / f"{seed}.whole.mcap"
     salvage_run(partial, whole)
     raw = read_raw(whole, "/drive/raw")
     cycles = raw["cycle"][raw["cycle"] != NO_CYCLE].astype(np.int64)
     np.testing.assert_array_equal(cycles, np.arange(len(cycles)))
     assert (last - cycles[-1]) / RATE_HZ <= 1.0, f"seed {seed}: {last - cycles[-1]} cycles were lost"
-    if cycles[-1] > 500:  # the motion proper has begun
+    if cycles[-1] > 200:  # the motion proper has begun
         recording = read_recording(whole)
         assert recording.metadata["outcome"] == "interrupted"
         assert recording.wrench is not None
