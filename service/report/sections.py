@@ -102,18 +102,14 @@ def unexplained(content: dict[str, Any]) -> str:
 def fit(content: dict[str, Any]) -> str:
     """Before and after, on the run and on the held-out recording."""
     tables = content["fit"]
-    result = "<h2>Before and after</h2>"
-    if tables["validation"]["before"]:
-        result += (
-            f"<figure>{before_after(tables['validation'], 'On a recording not used in the fit')}</figure>"
-        )
-    else:
-        result += (
-            "<p>No held-out recording was given: the gain below is on the run itself, which proves less.</p>"
-        )
-    result += (
-        f"<figure>{before_after(tables['training'], 'On the run itself, averaged over its periods')}</figure>"
-    )
+    result, held = "<h2>Before and after</h2>", tables["validation"]
+    result += "".join(f'<div class="warn">{escape(item["sentence"])}</div>' for item in held.get("rejected", []))
+    if held["before"]:
+        result += f"<figure>{before_after(held, 'On a recording not used in the fit')}</figure>"
+    elif not held.get("rejected"):
+        result += "<p>No held-out recording was given: the gain on the run itself proves less.</p>"
+    trained = before_after(tables["training"], "On the run itself, averaged over its periods")
+    result += f"<figure>{trained}</figure>"
     notes = "".join(f"<p class='note'>{escape(note)}</p>" for note in tables["validation"].get("notes", []))
     return result + notes
 
