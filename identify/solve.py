@@ -64,10 +64,21 @@ class Solution:
         return self.rows - self.rank
 
 
-def _whitened_system(
+def whitened_system(
     blocks: tuple[Block, ...], noises: list[NoiseModel], theta: FloatArray, scale: FloatArray, free: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Whitened Jacobian with respect to (theta, free scales), and whitened residual."""
+    """Form the whitened Jacobian and residual at given parameters.
+
+    Args:
+        blocks: averaged rows.
+        noises: noise per sample of each block.
+        theta: parameters, shape (P,).
+        scale: torque-constant scales, shape (n,).
+        free: joints whose scale is free, shape (k,).
+
+    Returns:
+        Jacobian with respect to (theta, free scales), shape (rows, P + k), and residual, shape (rows,).
+    """
     jacobians, rests = [], []
     for block, noise in zip(blocks, noises, strict=True):
         factors = np.where(block.joint >= 0, scale[np.maximum(block.joint, 0)], 1.0)
@@ -226,7 +237,7 @@ def solve(
     """
     free = np.asarray(free_scales, dtype=int)
     theta, scale = refine(blocks, noises, joints, free, start)
-    jacobian, rest = _whitened_system(blocks, noises, theta, scale, free)
+    jacobian, rest = whitened_system(blocks, noises, theta, scale, free)
     step, *factors = _step(jacobian, rest)
     theta, scale = theta + step[: len(theta)], scale.copy()
     scale[free] += step[len(theta) :]

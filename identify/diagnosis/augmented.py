@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,9 +11,12 @@ from identify.diagnosis.candidates import Trial
 from identify.diagnosis.problem import Problem
 from identify.fit import Fit
 from identify.physics.effect import Effect, Place
+from identify.physics.scene import Scene
 from identify.rotations import FloatArray
+from identify.solve import whitened_system
 
 _ITERATIONS = 5
+_RENEWALS = 3  # rounds around the joint fit: strong effects move the torque constants far
 _TRUST = 0.3  # relative change of a shape parameter that one step may make
 
 
@@ -124,16 +127,72 @@ def augment(problem: Problem, trials: list[Trial]) -> Augmented:
     """
     members = [_Member(t.effect, t.place, sorted(int(k) for k in t.kept), t.values.copy(), dict(t.shape)) for t in trials]
     base = problem.jacobian
+    best = (np.inf, [dict(member.shape) for member in members])
     for _ in range(_ITERATIONS):
         matrix, parts = _joint(problem, members, base)
+        chi2 = _at_these_shapes(matrix, parts, base.shape[1], problem.residual)
+        if chi2 < best[0]:
+            best = (chi2, [dict(member.shape) for member in members])
         solution, covariance = _solve(matrix, problem.residual)
         if _advance(members, parts, solution, base.shape[1]) < 1e-3:
             break
+    for member, shape in zip(members, best[1], strict=True):
+        member.shape = shape  # a step that made things worse is taken back
     matrix, parts = _joint(problem, members, base)
     solution, covariance = _solve(matrix, problem.residual)
     _advance(members, parts, solution, base.shape[1], move=False)
     rest = problem.residual - matrix @ solution
     return _result(problem, members, parts, matrix, solution, covariance, rest)
+
+
+def _at_these_shapes(matrix: FloatArray, parts: list[tuple[int, int]], first: int, residual: FloatArray) -> float:
+    """Chi-square with the shapes held where they are: the tangents left out."""
+    keep = list(range(first))
+    for columns, tangents in parts:
+        keep += range(first, first + columns)
+        first += columns + tangents
+    rest = residual - matrix[:, keep] @ _solve(matrix[:, keep], residual)[0]
+    return float(rest @ rest)
+
+
+def fit_jointly(problem: Problem, trials: list[Trial]) -> tuple[Augmented, Problem]:
+    """Fit baseline and effects together where the joint fit itself lies.
+
+    The model is bilinear in the torque constants and the effects' columns follow the fitted loads and currents, so a
+    fit linearised at the baseline alone is biased by what the baseline lacked: scenes and Jacobian are renewed.
+
+    Args:
+        problem: the problem of the baseline.
+        trials: the effects with their shapes so far.
+
+    Returns:
+        The joint fit, and the problem linearised at it.
+    """
+    result = augment(problem, trials)
+    for _ in range(_RENEWALS if trials else 0):
+        problem = _renewed(problem, result)
+        trials = [replace(t, values=a.values, shape=a.shape) for t, a in zip(trials, result.additions, strict=True)]
+        result = augment(problem, trials)
+    return result, problem
+
+
+def _renewed(problem: Problem, result: Augmented) -> Problem:
+    """The same problem around a joint fit: its residual is that of the renewed baseline without the effects."""
+    fit, solution = problem.fit, problem.fit.solution
+    jacobian, rest = whitened_system(fit.rows.blocks, fit.noises, result.theta, result.scale, solution.free_scales)
+    moved = replace(fit, solution=replace(solution, theta=result.theta, scale=result.scale, jacobian=jacobian, whitened=rest))
+    scenes = []
+    for scene in problem.scenes:
+        found = sum((_drive_share(scene, a) for a in result.additions), np.zeros(1))
+        theta = np.where(solution.identifiable[: len(result.theta)], result.theta, 0.0)
+        scenes.append(replace(scene, theta=theta, scale=result.scale, found=found if np.ndim(found) == 2 else None))
+    return Problem(moved, tuple(scenes), problem.extra)
+
+
+def _drive_share(scene: Scene, item: Addition) -> FloatArray:
+    """What an effect adds to the drive torques, shape (n, B)."""
+    columns = item.effect.columns(scene, item.place, item.shape)[: scene.robot.n]
+    return np.tensordot(columns, item.values, axes=([1], [0]))
 
 
 def _without_extra(covariance: FloatArray, base: int, whole: int) -> FloatArray:

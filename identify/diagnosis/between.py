@@ -238,7 +238,7 @@ def pick_progress(problem: Problem, effects: list[Effect], level: float) -> list
     Returns:
         At most three effects, each with the names of its rivals.
     """
-    tests = [item for item in progressive_tests(problem, effects) if item.p_value <= level]
+    tests = [item for item in progressive_tests(problem, effects) if item.p_value <= level and item.gain > _PRICE * (item.width + 1)]
     home = {id(item): set(item.channels(problem)) for item in tests}
     result: list[tuple[Progress, tuple[str, ...]]] = []
     while tests and len(result) < _MOST:

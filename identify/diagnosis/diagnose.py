@@ -10,7 +10,7 @@ from scipy import stats
 from identify.blocks import residual
 from identify.dataset import Dataset
 from identify.diagnosis.adequacy import Adequacy, examine
-from identify.diagnosis.augmented import Augmented, augment
+from identify.diagnosis.augmented import Augmented, fit_jointly
 from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, pick_progress
 from identify.diagnosis.blind_spots import blind_spots, place_name
 from identify.diagnosis.candidates import all_trials, best_by_place, log_chance
@@ -75,10 +75,12 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
         problem = replace(problem, extra=np.hstack([item.mean_columns(problem) for item, _ in progress]))
     selection = backward(problem, select(problem, effects, LEVEL_NAMED * options.level, rng), LEVEL_NAMED * options.level)
     selection, rest = _gate(problem, selection, options)
-    augmented = augment(problem, [item.trial for item in selection.named])
+    augmented, renewed = fit_jointly(problem, [item.trial for item in selection.named])
     shown = held_out(fit, augmented, other, rng) if other is not None else None
-    findings = _findings(problem, selection, augmented)
-    findings += _constant_findings(problem, augmented, rest, LEVEL_CONSTANT * options.level)
+    findings = _findings(renewed, selection, augmented)
+    drifting = {item.place.joint for item, _ in progress if item.effect.name == "torque_constant_drift"}
+    constants = _constant_findings(problem, augmented, rest, LEVEL_CONSTANT * options.level)
+    findings += tuple(c for c in constants if fit.model.robot.joint_names.index(c.joint) not in drifting)
     findings += tuple(_progress_finding(problem, item, rivals) for item, rivals in progress)
     tones = foreign_tones(problem)
     unexplained = _unexplained(problem, rest, tones, options)
@@ -88,7 +90,7 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
         findings,
         unexplained,
         tuple(spots),
-        _training(problem, augmented),
+        _training(fit, renewed, augmented),
         shown,
         locate(fit),
         None,
@@ -237,37 +239,24 @@ def _verdict(findings: tuple[Finding, ...], unexplained: Unexplained | None, fit
     return "explained" if findings else "consistent"
 
 
-def _training(problem: Problem, augmented: Augmented) -> ChannelFit:
+def _training(fit: Fit, renewed: Problem, augmented: Augmented) -> ChannelFit:
     """RMS of the averaged residual before and after, in N.m and N."""
-    fit = problem.fit
-    before = fit.residual_rms
     after, noise = {}, {}
     levels = fit.noise_std
-    change = _explained(problem, augmented)
-    for block, series in zip(problem.blocks, change, strict=True):
-        rest = residual(block, fit.solution.theta, fit.solution.scale) - series
+    for index, block in enumerate(fit.rows.blocks):
+        rest = residual(block, augmented.theta, augmented.scale) - _effects_on(renewed, augmented, index)
         for k, (channel, joint) in enumerate(zip(block.channels, block.joint, strict=True)):
             factor = abs(1.0 / augmented.scale[joint]) if joint >= 0 else 1.0
             used = block.usable[k]
             after[channel] = float(np.sqrt(np.mean(rest[k][used] ** 2)) * factor) if used.any() else 0.0
-            noise[channel] = levels[channel] / np.sqrt(block.repeats)
-    return ChannelFit(before, after, noise)
+            noise[channel] = levels[channel] / float(np.sqrt(block.repeats))
+    return ChannelFit(fit.residual_rms, after, noise)
 
 
-def _explained(problem: Problem, augmented: Augmented) -> list[FloatArray]:
-    """What baseline change and effects add to the prediction of every block, measurement units, (c, B)."""
-    fit, count = problem.fit, len(problem.fit.model.parameters)
-    d_theta = augmented.theta - np.where(fit.solution.identifiable[:count], fit.solution.theta, augmented.theta)
-    result = []
-    for index, block in enumerate(problem.blocks):
-        factors = np.where(block.joint >= 0, fit.solution.scale[np.maximum(block.joint, 0)], 1.0)
-        total = factors[:, None] * np.tensordot(block.columns, d_theta, axes=([1], [0]))
-        base = np.tensordot(block.columns, fit.solution.theta, axes=([1], [0])) + block.known
-        change = np.where(block.joint >= 0, (augmented.scale - fit.solution.scale)[np.maximum(block.joint, 0)], 0.0)
-        total += change[:, None] * base
-        for item in augmented.additions:
-            columns = problem.enter(index, item.effect.columns(problem.scenes[index], item.place, item.shape))
-            total += np.tensordot(columns, item.values, axes=([1], [0]))
-        result.append(total)
-    return result
-
+def _effects_on(renewed: Problem, augmented: Augmented, index: int) -> FloatArray:
+    """What the named effects add to one block's prediction, measurement units, (c, B)."""
+    total = np.zeros(renewed.blocks[index].target.shape)
+    for item in augmented.additions:
+        columns = renewed.enter(index, item.effect.columns(renewed.scenes[index], item.place, item.shape))
+        total += np.tensordot(columns, item.values, axes=([1], [0]))
+    return total

@@ -33,7 +33,6 @@ class Location:
 def _wald(internal: Fit, external: Fit) -> float | None:
     """Probability that the shared parameters differ this much by noise alone."""
     names_i = [p.name for p in internal.model.parameters]
-    names_e = [p.name for p in external.model.parameters]
     shared = [
         (names_i.index(p.name), k)
         for k, p in enumerate(external.model.parameters)

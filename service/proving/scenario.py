@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,4 +64,6 @@ def draw_scenario(plant: PlantSpec, number: int, campaign_seed: int) -> Scenario
 
 
 def _draw(plant: PlantSpec, name: str, rng: np.random.Generator) -> EffectSpec:
-    return draw_effect(plant, name, rng, size_factor=1.0)
+    if name == "bearing_moment_friction":  # only the plate knows a tilting moment, and only at the first joint
+        return replace(draw_effect(plant, name, rng), joint=plant.joint_names[0])
+    return draw_effect(plant, name, rng)
