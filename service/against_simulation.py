@@ -112,5 +112,5 @@ def _sentence(found: Decomposition, effects: list[str]) -> str:
     return (
         f"Recording less simulation is largest against its noise in {worst.replace('_', ' ')}: {share.difference:.3g} {unit} RMS (noise {share.noise:.2g}), "
         f"of whose power {100 * share.shares['parameters']:.0f} % is parameter error, {100 * share.shares['effects']:.0f} % {named}, "
-        f"{100 * share.shares['rest']:.0f} % rest; compared {how}."
+        f"{100 * share.shares['noise']:.0f} % the recording's noise and {100 * share.shares['rest']:.0f} % a rest; compared {how}."
     )

@@ -37,7 +37,7 @@ class Share:
         effects: RMS of the named effects.
         rest: RMS of what is left, noise included.
         noise: of the averaged recording.
-        shares: signed shares of the difference's power, which add up to 1, by part.
+        shares: signed shares of the difference's power, which add up to 1: parameters, effects, noise, rest beyond it.
         simulation_rest: what the same model leaves of the simulation on its own motion, RMS.
     """
 
@@ -225,4 +225,6 @@ def _share(difference: FloatArray, parameters: FloatArray, effects: FloatArray, 
     parts = {"parameters": parameters, "effects": effects, "rest": rest}
     sizes = {name: float(np.sqrt(np.mean(part**2))) for name, part in parts.items()}
     shares = {name: float(difference @ part) / power for name, part in parts.items()}
+    shares["noise"] = float(np.clip(noise**2 * len(difference) / power, 0.0, max(shares["rest"], 0.0)))
+    shares["rest"] -= shares["noise"]
     return Share(float(np.sqrt(power / len(difference))), noise=noise, shares=shares, simulation_rest=beyond, **sizes)

@@ -9,7 +9,12 @@ from typing import Any
 from service.report.plots import WIDTH, words
 from service.report.svg import AFTER, BEFORE, INK, MODEL, NOISE, number, picture, rect, text
 
-_PARTS = (("parameters", "parameters", AFTER), ("effects", "named effects", MODEL), ("rest", "rest", BEFORE))
+_PARTS = (
+    ("parameters", "parameters", AFTER),
+    ("effects", "named effects", MODEL),
+    ("noise", "noise", NOISE),
+    ("rest", "rest", BEFORE),
+)
 
 
 def against_section(found: dict[str, Any], table: Callable[..., str]) -> str:

@@ -17,12 +17,15 @@ def headline(content: dict[str, Any]) -> str:
     Returns:
         Plain text.
     """
-    names = [_named(item) for item in content["findings"]]
+    since = [item for item in content["findings"] if "since the reference" in item["where"]["region"]]
+    names = [_named(item) for item in content["findings"] if item not in since]
     if content["verdict"] == "consistent":
         text = f"The model of {content['robot']} explains this recording down to its noise."
         if content.get("lack_of_fit", {}).get("p") is None:
             text += " The run does not repeat, so small misfits cannot be told from noise."
         return text + " What such a recording could not have shown stands under Blind spots."
+    if since:
+        return " ".join(item["sentence"] for item in since) + _beside(content, names)
     if not names:
         return "The model does not explain this recording, and no effect of the catalogue does: see what is left and where."
     text = f"{_list(names)} {'explains' if len(names) == 1 else 'explain'} what the model lacks"
@@ -30,6 +33,12 @@ def headline(content: dict[str, Any]) -> str:
         ", but something without a name is left." if content["unexplained"] else "; what is left is noise."
     )
     return text + _gain(content)
+
+
+def _beside(content: dict[str, Any], names: list[str]) -> str:
+    """What a run with changes since its reference shows besides them."""
+    text = f" Besides: {_list(names)}." if names else ""
+    return text + (" Something without a name is left." if content["unexplained"] else "")
 
 
 def _named(item: dict[str, Any]) -> str:

@@ -75,7 +75,7 @@ def _finding(item: dict[str, Any], curve: dict[str, Any] | None) -> str:
     where_ = item["where"]
     facts = (
         f'<p class="note">Shows in {escape(", ".join(words(c) for c in where_["channels"]))}; {escape(where_["region"])}. '
-        f"Chance that noise alone looks like this: {number(item['p_value'], 2)}.</p>"
+        f"Chance that noise alone looks like this: {_chance(item['p_value'])}.</p>"
     )
     rivals = ""
     if item["alternatives"]:
@@ -87,6 +87,10 @@ def _finding(item: dict[str, Any], curve: dict[str, Any] | None) -> str:
         f'<p class="lead">{escape(item["sentence"])}</p>{picture}'
         f"{table(('parameter', 'value', 'std', 'unit'), rows, (1, 2), 'small')}{facts}{rivals}</div>"
     )
+
+
+def _chance(p_value: float) -> str:
+    return "below 1e-300" if p_value <= 1e-300 else number(p_value, 2)
 
 
 def unexplained(content: dict[str, Any]) -> str:
@@ -103,7 +107,9 @@ def fit(content: dict[str, Any]) -> str:
     """Before and after, on the run and on the held-out recording."""
     tables = content["fit"]
     result, held = "<h2>Before and after</h2>", tables["validation"]
-    result += "".join(f'<div class="warn">{escape(item["sentence"])}</div>' for item in held.get("rejected", []))
+    result += "".join(
+        f'<div class="warn">{escape(item["sentence"])}</div>' for item in held.get("rejected", [])
+    )
     if held["before"]:
         result += f"<figure>{before_after(held, 'On a recording not used in the fit')}</figure>"
     elif not held.get("rejected"):

@@ -152,6 +152,7 @@ def test_what_a_simulator_lacks_is_split_into_parts(folder, simulated):
     for channel, item in found["channels"].items():
         assert sum(item["shares"].values()) == pytest.approx(1.0), channel
         assert item["rest"] == pytest.approx(item["noise"], rel=0.15), channel
+        assert abs(item["shares"]["rest"]) < 0.2, channel
     joint = found["channels"]["joint_2"]
     assert joint["effects"] > 0.5
     assert joint["difference"] > 1.2 * joint["noise"]

@@ -182,7 +182,9 @@ def test_the_comparison_with_a_simulation_is_drawn(content):
         "kind": "simulation",
         "sentence": "They differ.",
         "parameters": [],
-        "channels": {"joint_2": share | {"shares": {"parameters": 0.5, "effects": 0.3, "rest": 0.2}}},
+        "channels": {
+            "joint_2": share | {"shares": {"parameters": 0.5, "effects": 0.3, "noise": 0.1, "rest": 0.1}}
+        },
     }
     _, text = read(report_html(odd))
     assert "Against the simulation" in text
