@@ -97,7 +97,7 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
         rest.structures,
         (),
         _warnings(fit),
-        {"augmented": augmented, "progress": tuple(item for item, _ in progress), "problem": problem},
+        {"augmented": augmented, "progress": tuple(item for item, _ in progress), "problem": problem, "renewed": renewed},
     )
 
 
