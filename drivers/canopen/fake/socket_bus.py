@@ -21,6 +21,7 @@ from drivers.errors import BusOffError, LinkError
 
 _FRAME = struct.Struct("<qHBB")  # stamp [ns], identifier, own echo, error; the data follow
 _LONGEST_WAIT_NS = 20_000_000
+_ECHO_NS = 150_000_000
 
 
 class SocketLink:
@@ -52,6 +53,18 @@ class SocketLink:
             self._end.send(_FRAME.pack(0, identifier, 0, 0) + data)
         except OSError as error:
             raise LinkError(f"The simulated bus has gone ({error.strerror}); start the run again.") from None
+        if identifier == SYNC and not self._is_off:
+            self._await_echo(time.monotonic_ns() + _ECHO_NS)
+
+    def _await_echo(self, deadline_ns: int) -> None:
+        """Hold the bus until the simulated drives have seen the SYNC: a busy machine delays it, as a late
+        SYNC that the stamps show, instead of losing answers that no real drive would have lost.
+        """
+        while (wait_ns := deadline_ns - time.monotonic_ns()) > 0:
+            if not self._fetch():
+                self._poll.poll(wait_ns * 1e-6)
+            elif self._frames[-1].own:
+                return
 
     def receive(self, deadline_ns: int) -> Frame | None:
         """The next frame, or None at the deadline."""
