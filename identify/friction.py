@@ -33,12 +33,17 @@ def internal_columns(robot: Robot, q: FloatArray, qd: FloatArray, sign: FloatArr
     speed = drive_velocity(robot, qd)
     direction = np.sign(speed) if sign is None else sign
     columns = np.zeros((robot.n, len(internal_parameters(robot)), q.shape[1]))
+    to_drive = np.eye(robot.n) if robot.coupling is None else np.linalg.inv(robot.drive_matrix).T
     k = 0
     for index, joint in enumerate(robot.joints):
         drive = joint.drive
         terms = {"coulomb": direction[index], "viscous": speed[index], "asymmetric_viscous": np.abs(speed[index])}
         for term in drive.friction:
-            columns[index, k] = terms[term]
+            if term in terms:
+                columns[index, k] = terms[term]
+            else:  # on the joint itself: a coupled transmission hands it on to every motor that moves the joint
+                own = np.sign(qd[index]) if term == "joint_coulomb" else qd[index]
+                columns[:, k] = to_drive[:, index, None] * own
             k += 1
         if drive.offset:
             columns[index, k] = 1.0

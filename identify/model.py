@@ -149,7 +149,15 @@ class Model:
         usual = np.sqrt(np.mean(speed**2, axis=1))
         slow = np.abs(speed) < (3.0 * speed_std + _DIRECTION_SHARE * usual)[:, None]
         rubs = np.array(["coulomb" in joint.drive.friction for joint in self.robot.joints])
-        return slow & rubs[:, None]
+        return (slow & rubs[:, None]) | self._joint_sign_unknown(qd)
+
+    def _joint_sign_unknown(self, qd: FloatArray) -> FloatArray:
+        """The same for friction on the joints' own side, on every drive that it reaches, shape (n, N)."""
+        rubs = np.array(["joint_coulomb" in joint.drive.friction for joint in self.robot.joints])
+        usual = np.sqrt(np.mean(qd**2, axis=1, keepdims=True))
+        slow = (np.abs(qd) < _DIRECTION_SHARE * usual) & rubs[:, None]
+        reaches = np.abs(np.linalg.inv(self.robot.drive_matrix).T) > 1e-12
+        return (reaches.astype(int) @ slow.astype(int)) > 0
 
 
 def _named(row: FloatArray, names: list[str]) -> dict[str, float]:

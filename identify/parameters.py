@@ -52,7 +52,7 @@ def internal_parameters(robot: Robot) -> list[Parameter]:
         drive, torque = joint.drive, joint.torque_unit
         per_speed = f"{torque}.s/m" if joint.prismatic else f"{torque}.s/rad"
         for term in drive.friction:
-            unit = torque if term == "coulomb" else per_speed
+            unit = torque if term.endswith("coulomb") else per_speed
             result.append(Parameter(f"{joint.name}.{term}", "friction", unit, {}, joint.name))
         if drive.offset:
             result.append(Parameter(f"{joint.name}.offset", "offset", torque, {}, joint.name))

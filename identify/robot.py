@@ -9,7 +9,7 @@ import numpy as np
 from identify.errors import ModelError
 from identify.rotations import FloatArray
 
-FRICTION_TERMS = ("coulomb", "viscous", "asymmetric_viscous")
+FRICTION_TERMS = ("coulomb", "viscous", "asymmetric_viscous", "joint_coulomb", "joint_viscous")
 WRENCH_CHANNELS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 

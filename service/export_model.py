@@ -10,6 +10,7 @@ from identify.consistency import Consistency
 from identify.inertia import PARAMETERS
 from identify.parameters import unknown_rotors
 from identify.robot import Robot
+from service.errors import EstimateError
 from service.estimate_reading import Estimate, FloatArray
 
 
@@ -131,6 +132,13 @@ def _without_gaps(
 def _drive_terms(joint: str, harmonics: int, own: dict[str, float], rotor_inertia: float) -> DriveTerms:
     def value(term: str) -> float:
         return own.get(f"{joint}.{term}", 0.0)
+
+    held = next((name for name in own if name.startswith(f"{joint}.joint_")), None)
+    if held is not None:
+        raise EstimateError(
+            f"The estimate has friction on a joint's own side ({held}), which neither URDF nor MJCF can hold beside its motor's; "
+            "identify with friction = [\"coulomb\", \"viscous\"] to export."
+        )
 
     orders = range(1, harmonics + 1)
     return DriveTerms(

@@ -13,7 +13,7 @@ from service.errors import UsageError
 Vector3 = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-FrictionTerm = Annotated[str, Field(pattern="^(coulomb|viscous|asymmetric_viscous)$")]
+FrictionTerm = Annotated[str, Field(pattern="^((joint_)?(coulomb|viscous)|asymmetric_viscous)$")]
 
 
 class _Section(BaseModel):
