@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import signal
-import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 Tell = Callable[[str, float], None]
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_WATCH_S = 0.5  # the kernel's own death signal follows the parent's thread, which may end long before it
 
 
 def prepare_worker() -> None:
@@ -51,12 +51,15 @@ def perform(kind: str, order: Mapping[str, Any], progress_path: str) -> dict[str
 
 
 def die_with_parent() -> None:
-    """Let the kernel end this process when the server dies, however it dies (Linux)."""
-    if not sys.platform.startswith("linux"):
-        return
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() == 1:  # it died before this line
+    """End this process soon after the server has died, however it died: nobody could use its result."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_WATCH_S)
         os._exit(1)
+
+    threading.Thread(target=watch, name="parent watch", daemon=True).start()
 
 
 def _write_progress(path: Path, stage: str, share: float) -> None:

@@ -20,6 +20,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "export": ("export", "An estimate as URDF and MJCF."),
     "prove": ("prove", "Blind trials of the diagnosis on concealed effects."),
     "import": ("import_", "A foreign recording (csv, npz, db3, mcap) as a log."),
+    "serve": ("serve", "The REST API and the lab's web page."),
     "recover": ("recover", "A broken log's intact part as a valid log."),
 }
 _INTERRUPTED = 130  # what shells report for Ctrl-C

@@ -1,0 +1,1 @@
+"""Nightly recalibration: measure, compare with what is in force, decide, tell."""
