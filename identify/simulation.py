@@ -30,8 +30,9 @@ class Course:
     """How an effect grows over a run.
 
     Attributes:
-        kind: ``ramp`` (coefficients per second) or ``settling``.
-        time_constant_s: of a settling course.
+        kind: ``ramp`` (coefficients per second), ``settling``, or ``dying_out`` (what the effect lets die out
+            after the start, in its own columns).
+        time_constant_s: of a course that is no ramp.
         start_s: start of the run it was found in, after the first joint sample.
         span_s: length of that run.
     """
@@ -162,9 +163,15 @@ def _effects(full: FullModel, motion: SmoothMotion) -> FloatArray:
     scene = Scene(full.model, full.theta, full.scale, t, motion.q, motion.qd, motion.qdd, False, has_wrench)
     total = np.zeros((scene.rows, len(t)))
     for item in full.effects:
-        part = np.tensordot(item.effect.columns(scene, item.place, item.shape), item.values, axes=([1], [0]))
+        part = np.tensordot(_columns(scene, item), item.values, axes=([1], [0]))
         total += part if item.course is None else part * item.course.at(motion.t_s)
     return total
+
+
+def _columns(scene: Scene, item: AppliedEffect) -> FloatArray:
+    if item.course is not None and item.course.kind == "dying_out" and item.effect.settling is not None:
+        return item.effect.settling(scene, item.place)
+    return item.effect.columns(scene, item.place, item.shape)
 
 
 def _stream(

@@ -13,7 +13,7 @@ from identify.diagnosis.between import Progress
 from identify.diagnosis.findings import Diagnosis
 from identify.fit import Fit
 from identify.physics.effect import Place
-from identify.robot import Robot
+from identify.robot import WRENCH_CHANNELS, Robot
 from service.estimate_file import estimate_content
 from service.robots import LoadedRobot
 
@@ -54,8 +54,9 @@ def _addition(item: Addition, robot: Robot) -> dict[str, Any]:
 
 def _progress(item: Progress, fit: Fit) -> dict[str, Any]:
     assert fit.window is not None
-    names, robot = [c.name for c in item.effect.coefficients], fit.model.robot
-    per = "/s" if item.course == "ramp" else ""
+    robot, dying = fit.model.robot, item.effect.settling is not None
+    named = _starts(item) if dying else [(c.name, c.unit) for c in item.effect.coefficients]
+    names, per = [name for name, _ in named], "/s" if item.course == "ramp" else ""
     return {
         "effect": item.effect.name,
         **_place(item.place, robot),
@@ -63,15 +64,22 @@ def _progress(item: Progress, fit: Fit) -> dict[str, Any]:
         "std": {name: _number(float(value)) for name, value in zip(names, item.std, strict=True)},
         "shape": {s.name: s.grid[len(s.grid) // 2] for s in item.effect.shapes},
         "shape_std": {s.name: None for s in item.effect.shapes},
-        "units": _units([(c.name, c.unit + per) for c in item.effect.coefficients], item.place, robot),
+        "units": _units([(name, unit + per) for name, unit in named], item.place, robot),
         "delta_chi2": _number(item.gain),
         "course": {
-            "kind": item.course,
+            "kind": "dying_out" if dying else item.course,
             "time_constant_s": _number(item.time_constant_s),
             "start_s": float(fit.window.start_s),
             "span_s": float(fit.window.stop_s - fit.window.start_s),
         },
     }
+
+
+def _starts(item: Progress) -> list[tuple[str, str]]:
+    """What stood at the start and dies out: one amount a wrench channel, or one a column."""
+    if len(item.values) == len(WRENCH_CHANNELS):
+        return [(f"start.{channel}", "N" if channel.startswith("force") else "N.m") for channel in WRENCH_CHANNELS]
+    return [(f"start_{k + 1}", "") for k in range(len(item.values))]
 
 
 def _rms(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -39,9 +39,11 @@ def _effect(entry: Any, estimate: Estimate) -> AppliedEffect:
         effect = effect_named(entry["effect"])
         robot = estimate.loaded.robot
         place = Place(_index(entry["joint"], robot), entry["channel"], _index(entry.get("partner"), robot))
-        values = np.array([float(entry["coefficients"][c.name]) for c in effect.coefficients])
         shape = {s.name: float(entry["shape"][s.name]) for s in effect.shapes}
         course = None if entry.get("course") is None else _course(entry["course"])
+        found, dying = entry["coefficients"], course is not None and course.kind == "dying_out"
+        names = list(found) if dying else [c.name for c in effect.coefficients]
+        values = np.array([float(found[name]) for name in names])
     except (KeyError, TypeError, ValueError) as error:
         raise UsageError(
             f"Estimate {estimate.source}: one of its effects is not understood ({error}); diagnose the run again with this version."

@@ -30,9 +30,15 @@ def headline(content: dict[str, Any]) -> str:
         return "The model does not explain this recording, and no effect of the catalogue does: see what is left and where."
     text = f"{_list(names)} {'explains' if len(names) == 1 else 'explain'} what the model lacks"
     text += (
-        ", but something without a name is left." if content["unexplained"] else "; what is left is noise."
+        ", but something without a name is left." if content["unexplained"] else _left(content)
     )
     return text + _gain(content)
+
+
+def _left(content: dict[str, Any]) -> str:
+    if content.get("lack_of_fit", {}).get("p") is None:
+        return "; the run does not repeat, so what is left cannot be told from noise."
+    return "; what is left is noise."
 
 
 def _beside(content: dict[str, Any], names: list[str]) -> str:

@@ -37,7 +37,7 @@ def variable_words(variable: str) -> str:
     return (
         f"{words(head)} of {words(tail)}"
         if tail
-        else words(head) + (" in the period" if head == "time" else "")
+        else words(head) + (" of the run or period" if head == "time" else "")
     )
 
 
