@@ -100,7 +100,7 @@ class Acquisition:
         self._recorder: Recorder | None = None
         self._before: PlateRest | None = None
         self._after: PlateRest | None = None
-        self._last_ns = 0
+        self._last_ns = self._last_plate_ns = 0
         self._overloaded = 0
         self._granted = ""
         self._kept = -1  # the last cycle handed to the recorder
@@ -227,8 +227,9 @@ class Acquisition:
             if self._overloaded >= _OVERLOADED:
                 raise HardwareError("The force plate is overloaded: a channel is at or beyond its range; "
                                     "choose a larger range or a gentler excitation.")
-        if samples[-1].read_ns - self._last_ns >= _SYNC_NS:
-            last = samples[-1]
+        last = samples[-1]
+        if last.read_ns - self._last_plate_ns >= _SYNC_NS:
+            self._last_plate_ns = last.read_ns
             recorder.put_sync("force_plate", last.ticks, last.read_ns, mapped_ns, uncertainty_s)
 
     def _look_at_wall_clock(self, now_ns: int, recorder: Recorder) -> None:
