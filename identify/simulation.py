@@ -132,7 +132,9 @@ def recorded_motion(data: Dataset) -> tuple[SmoothMotion, bool]:
         whole = filtered.copy()
         whole[:, inside] = lines
         parts.append(whole)
-    return replace(motion, q=parts[0], qd=parts[1], qdd=parts[2], valid=motion.valid | inside), True
+    return replace(
+        motion, q=parts[0], qd=parts[1], qdd=parts[2], valid=inside
+    ), True  # the transient is only filtered
 
 
 def simulate(full: FullModel, data: Dataset) -> Simulated:
