@@ -90,11 +90,17 @@ def _lines(problem: Problem, series: FloatArray) -> tuple[float, ...]:
     return tuple(sorted(round(float(line * window.fundamental_hz), 6) for line in strongest if power[line] > 0))
 
 
+def readable_place(place: str) -> str:
+    """A place at the head of a sentence: ``joint_2`` becomes ``Joint 2``."""
+    words = place.replace("_", " ").replace("+", " and ")
+    return "The robot" if place == "robot" else words[0].upper() + words[1:]
+
+
 def sentence_of(problem: Problem, item: Addition, parameters: tuple[FoundParameter, ...]) -> str:
     """Fill the effect's sentence with its place and numbers."""
     words = {p.name: f"{rounded(p.value, p.std)} {p.unit}".strip() for p in parameters}
     place = place_name(problem, item.place)
-    place = "The robot" if place == "robot" else place[0].upper() + place[1:]
+    place = readable_place(place)
     try:
         return item.effect.sentence.format(place=place, **words)
     except (KeyError, IndexError):

@@ -14,7 +14,7 @@ from identify.diagnosis.augmented import Augmented, fit_jointly
 from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, pick_progress
 from identify.diagnosis.blind_spots import blind_spots, place_name
 from identify.diagnosis.candidates import all_trials, best_by_place, log_chance
-from identify.diagnosis.describe import carrying_channels, parameters_of, sentence_of, where_of
+from identify.diagnosis.describe import carrying_channels, parameters_of, readable_place, sentence_of, where_of
 from identify.diagnosis.findings import (
     ChannelFit,
     Diagnosis,
@@ -26,6 +26,7 @@ from identify.diagnosis.findings import (
 )
 from identify.diagnosis.held_out import held_out
 from identify.diagnosis.locate import locate
+from identify.diagnosis.next_experiment import next_experiment
 from identify.diagnosis.problem import Problem, build_problem
 from identify.diagnosis.select import Named, Selection, backward, rebased, select
 from identify.fit import Fit
@@ -93,7 +94,7 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
         _training(fit, renewed, augmented),
         shown,
         locate(fit),
-        None,
+        next_experiment(findings, unexplained),
         rest.structures,
         (),
         _warnings(fit),
@@ -173,7 +174,7 @@ def _constant_rivals(problem: Problem, column: int, joint: int, gain: float) -> 
 def _constant_finding(name: str, nominal: float, scale: float, std: float, p: float, rivals: tuple[str, ...]) -> Finding:
     value, value_std = 1.0 / scale - 1.0, std / scale**2
     sentence = (
-        f"{name[0].upper() + name[1:]}'s torque constant is {nominal / scale:.4g} N.m/A, {100 * value:+.1f} % ± {100 * value_std:.1f} % "
+        f"{readable_place(name)}'s torque constant is {nominal / scale:.4g} N.m/A, {100 * value:+.1f} % ± {100 * value_std:.1f} % "
         f"from the robot file's {nominal:.4g} N.m/A."
     )
     parameters = (
@@ -194,7 +195,7 @@ def _progress_finding(problem: Problem, item: Progress, rivals: tuple[str, ...])
     return Finding(
         item.effect.name, joint, item.place.channel, parameters, max(item.p_value, 1e-300), item.gain, rivals,
         Where(item.channels(problem), "changing from period to period", ()),
-        f"{place[0].upper() + place[1:]}: {item.effect.name.replace('_', ' ')}, {course}: {numbers}.",
+        f"{readable_place(place)}: {item.effect.name.replace('_', ' ')}, {course}: {numbers}.",
     )
 
 

@@ -23,15 +23,15 @@ EFFECT = Effect(
     name="torque_constant_error",
     where="I",
     parity="X",
-    coefficients=(Coefficient("e", "1"),),
+    coefficients=(Coefficient("current_excess", "1"),),
     columns=_columns,
     places=_places,
     sentence=(
-        "{place}'s motor draws {e} more current than its nominal torque constant explains, so the true "
+        "{place}'s motor draws {current_excess} more current than its nominal torque constant explains, so the true "
         "constant is lower by about that share."
     ),
     reference=(
-        "Gautier & Briot, JDSMC 136(5) 2014: one torque row times 1 + e = K_nominal / K"
+        "Gautier & Briot, JDSMC 136(5) 2014: one torque row times 1 + current_excess = K_nominal / K"
     ),
     constraint=lambda scene, place, values, shape: bool(1.0 + values[0] > 0.0),
 )

@@ -78,6 +78,8 @@ def print_diagnosis(out: Console, content: dict[str, Any]) -> None:
         out.print(f"\nUnexplained: {content['unexplained']['sentence']}", markup=False)
     if content.get("against"):
         _print_against(out, content["against"])
+    if content["next_experiment"]:
+        out.print(f"\nNext experiment: {content['next_experiment']['sentence']}", markup=False)
     _print_rms(out, content)
     for warning in content["warnings"]:
         out.print(f"Warning: {warning}", markup=False)
