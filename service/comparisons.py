@@ -11,6 +11,7 @@ from service.config import NightlySection
 from service.nightly.levels import shift_level, trend_level
 from service.nightly.shift import Shift, compare, night_scatter
 from service.nightly.trend import Trend, TrendRule, torque_constant_trends
+from service.nightly.unknowns import unknowns_of
 from service.refusals import NotFound, Unusable
 from service.store.results import Estimate, Night
 
@@ -44,9 +45,11 @@ def compare_estimates(
         raise Unusable("The estimates are of different robots", "compare two of the same robot")
     used = shift_level(settings.false_alarms_per_year) if level is None else level
     nights = [
-        row.content for row in _night_estimates(session, a.robot_serial, _SCATTER_NIGHTS) if row.id != second
+        unknowns_of(row.content)
+        for row in _night_estimates(session, a.robot_serial, _SCATTER_NIGHTS)
+        if row.id != second
     ]
-    return compare(a.content, b.content, used, night_scatter(nights, used))
+    return compare(unknowns_of(a.content), unknowns_of(b.content), used, night_scatter(nights, used))
 
 
 def torque_constant_history(session: Session, serial: str, settings: NightlySection) -> dict[str, Any]:

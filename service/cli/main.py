@@ -21,6 +21,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "prove": ("prove", "Blind trials of the diagnosis on concealed effects."),
     "import": ("import_", "A foreign recording (csv, npz, db3, mcap) as a log."),
     "serve": ("serve", "The REST API and the lab's web page."),
+    "nightly": ("nightly", "Recalibrate for the night: compare with what is in force, propose or accept, alert."),
     "recover": ("recover", "A broken log's intact part as a valid log."),
 }
 _INTERRUPTED = 130  # what shells report for Ctrl-C

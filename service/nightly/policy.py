@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,9 +15,16 @@ _GOOD_VERDICTS = ("consistent", "explained")
 
 @dataclass(frozen=True)
 class Alarm:
-    """Something a person must hear of: ``failure``, ``shift``, ``drift`` or ``finding``."""
+    """Something a person must hear of.
+
+    Attributes:
+        kind: ``failure``, ``shift``, ``drift`` or ``finding``.
+        subject: what it is about; the same kind and subject on the next night is not sent again.
+        sentence: for people.
+    """
 
     kind: str
+    subject: str
     sentence: str
 
 
@@ -29,7 +36,7 @@ class Evidence:
         intervals_valid: whether the model fits within noise.
         validation_ratio: largest held-out error over noise; None without a held-out recording.
         verdict: of the diagnosis; None without one.
-        new_findings: sentences of findings that the night before did not have.
+        new_findings: sentence by finding that the night before did not have.
         shift: against the calibration in force; None where there is none.
         trends: of the torque constants.
         is_acceptable: false where data are simulated and the robot is real.
@@ -38,7 +45,7 @@ class Evidence:
     intervals_valid: bool
     validation_ratio: float | None = None
     verdict: str | None = None
-    new_findings: tuple[str, ...] = ()
+    new_findings: Mapping[str, str] = field(default_factory=dict)
     shift: Shift | None = None
     trends: tuple[Trend, ...] = ()
     is_acceptable: bool = True
@@ -88,10 +95,10 @@ def decide(evidence: Evidence, settings: NightlySection) -> Decision:
 
 
 def _alarms(evidence: Evidence) -> tuple[Alarm, ...]:
-    found = [Alarm("finding", sentence) for sentence in evidence.new_findings]
+    found = [Alarm("finding", *item) for item in evidence.new_findings.items()]
     if evidence.shift is not None and evidence.shift.has_moved:
-        found.append(Alarm("shift", evidence.shift.sentence))
-    found += [Alarm("drift", trend.sentence) for trend in evidence.trends if trend.is_alarm]
+        found.append(Alarm("shift", evidence.shift.moved, evidence.shift.sentence))
+    found += [Alarm("drift", trend.joint, trend.sentence) for trend in evidence.trends if trend.is_alarm]
     return tuple(found)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from service.nightly.unknowns import Unknowns, unknowns_of
+from service.nightly.unknowns import Unknowns
 
 _DEPENDENT = 1e-9  # of the largest eigenvalue of a correlation matrix: below, rounding decides
 LEAST_NIGHTS = 8  # fewer say too little about the scatter between nights
@@ -55,16 +55,21 @@ class Shift:
     compared: int
     sentence: str
 
+    @property
+    def moved(self) -> str:
+        """The group that differs most."""
+        return min(self.groups, key=lambda group: group.p_value).group if self.groups else ""
+
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
         return asdict(self)
 
 
 def compare(
-    first: Mapping[str, Any],
-    second: Mapping[str, Any],
+    first: Unknowns,
+    second: Unknowns,
     level: float,
-    scatter: Mapping[str, float] | None = None,
+    scatter: Scatter | None = None,
 ) -> Shift:
     """Test whether two estimates differ by more than their uncertainty.
 
@@ -72,19 +77,20 @@ def compare(
         first: the estimate in force.
         second: the new one.
         level: significance level of the whole test.
-        scatter: variance between nights by unknown, from ``night_scatter``; beyond both covariances.
+        scatter: between nights, from ``night_scatter``; beyond both covariances.
 
     Returns:
         The comparison.
     """
-    a, b = unknowns_of(first), unknowns_of(second)
+    a, b = first, second
     names = [name for name in a.names if name in b.names]
     if not names:
         return Shift(
             (), 1.0, level, False, 0, "The estimates have no parameter in common; nothing was compared."
         )
     a, b = a.only(names), b.only(names)
-    extra = np.diag([(scatter or {}).get(name, 0.0) for name in names])
+    # both estimates are of one night each, with its own weather
+    extra = 2.0 * scatter.of(names) if scatter is not None else 0.0
     difference, covariance = b.values - a.values, a.covariance + b.covariance + extra
     groups = tuple(_group(group, a, difference, covariance) for group in dict.fromkeys(a.groups))
     p_value = min(1.0, len(groups) * min(g.p_value for g in groups))
@@ -117,29 +123,73 @@ def _sentence(groups: Sequence[GroupShift], p_value: float, level: float) -> str
     )
 
 
-def night_scatter(contents: Sequence[Mapping[str, Any]], level: float) -> dict[str, float]:
-    """Variance between nights beyond what the covariances explain.
+@dataclass(frozen=True)
+class Scatter:
+    """Covariance between nights beyond what the estimates' own covariances explain.
 
-    Successive differences are used, so that a slow drift does not hide in the scatter (von Neumann 1941). The
-    variance is widened as Student's t asks for, because it comes from so many nights only.
+    Attributes:
+        names: unknowns.
+        covariance: (n, n); zero between groups.
+    """
+
+    names: tuple[str, ...]
+    covariance: np.ndarray
+
+    def of(self, names: Sequence[str]) -> np.ndarray:
+        """The part of these unknowns; zero for those that are not known."""
+        at = {name: k for k, name in enumerate(self.names)}
+        result = np.zeros((len(names), len(names)))
+        known = [k for k, name in enumerate(names) if name in at]
+        places = [at[names[k]] for k in known]
+        result[np.ix_(known, known)] = self.covariance[np.ix_(places, places)]
+        return result
+
+
+def night_scatter(nights: Sequence[Unknowns], level: float) -> Scatter | None:
+    """Measure how much more the nights differ than their covariances say: weather, grease, load.
+
+    Successive differences are used: a slow drift does not hide in the scatter (von Neumann 1941). What
+    moves together is seen together: one cold night stiffens all joints. The covariance is widened, for it
+    comes from so many nights only.
 
     Args:
-        contents: estimates of past nights, oldest first.
+        nights: estimates of past nights, oldest first.
         level: significance level of the test that will use it.
 
     Returns:
-        Variance by unknown; empty with fewer than ``LEAST_NIGHTS`` nights.
+        The scatter; None with fewer than ``LEAST_NIGHTS`` nights.
     """
-    from scipy import special  # late: the server starts faster without it
-
-    nights = [unknowns_of(content) for content in contents]
     if len(nights) < LEAST_NIGHTS:
-        return {}
+        return None
     names = [name for name in nights[0].names if all(name in night.names for night in nights)]
-    parts = [night.only(names) for night in nights]
-    values = np.array([part.values for part in parts])
-    within = np.mean([part.std**2 for part in parts], axis=0)
-    between = 0.5 * np.mean(np.diff(values, axis=0) ** 2, axis=0)
-    widened = (special.stdtrit(len(nights) - 1, level / 2) / special.ndtri(level / 2)) ** 2
-    excess = np.maximum(between - within, 0.0) * widened
-    return dict(zip(names, excess.tolist(), strict=True))
+    parts = [night if list(night.names) == names else night.only(names) for night in nights]
+    steps = np.diff(np.array([part.values for part in parts]), axis=0)
+    within = np.mean([part.covariance for part in parts], axis=0)
+    groups = parts[0].groups
+    covariance = np.zeros_like(within)
+    for group in set(groups):
+        block = np.ix_(*[[k for k, name in enumerate(groups) if name == group]] * 2)
+        factor = _widening(groups.count(group), len(nights), level / len(set(groups)))
+        covariance[block] = factor * _excess(steps[:, block[1][0]], within[block])
+    return Scatter(tuple(names), covariance)
+
+
+def _excess(steps: np.ndarray, within: np.ndarray) -> np.ndarray:
+    """What the steps (n, k) vary beyond `within` (k, k), direction by direction."""
+    std = np.sqrt(np.diag(within))
+    values, vectors = np.linalg.eigh(within / np.outer(std, std))
+    kept = values > _DEPENDENT * values[-1]
+    root = std[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    white = (steps / std) @ vectors[:, kept] / np.sqrt(values[kept])
+    ratios, directions = np.linalg.eigh(0.5 * white.T @ white / len(white))
+    axes = root @ directions
+    return (axes * np.maximum(ratios - 1.0, 0.0)) @ axes.T
+
+
+def _widening(dimensions: int, nights: int, level: float) -> float:
+    """Factor on a variance from so many nights that lets chi-square quantiles keep their level."""
+    from scipy import special
+
+    freedom = 2.0 * (nights - 1) / 3.0  # of a variance from successive differences
+    exact = dimensions * special.fdtri(dimensions, freedom, 1.0 - level)
+    return float(exact / special.chdtri(dimensions, level))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 _DAYS_PER_YEAR = 365.25
+_MOST_SIMILAR = 0.9  # beyond it a slope could never be told from slow wandering
 _LEAST_NIGHTS = 8  # below this the scatter of the nights is not known well enough to test a slope
 
 
@@ -86,7 +87,7 @@ def fit_trend(
     slope = float(np.sum(weight * (t - centre) * y)) / spread
     residual = (y - mean - slope * (t - centre)) / s
     scatter = float(np.sqrt(np.sum(residual**2) / (len(t) - 2)))
-    slope_std = max(1.0, scatter) / np.sqrt(spread)
+    slope_std = max(1.0, scatter) * _memory(residual) / np.sqrt(spread)
     p_value = float(2 * special.stdtr(len(t) - 2, -abs(slope) / slope_std))
     percent, percent_std = (100 * _DAYS_PER_YEAR * v / abs(mean) for v in (slope * np.sign(mean), slope_std))
     alarm = p_value < rule.level and abs(percent) >= rule.least_percent_per_year
@@ -94,6 +95,14 @@ def fit_trend(
         joint, len(t), float(percent), float(percent_std), p_value, scatter, bool(alarm),
         _sentence(joint, float(percent), float(percent_std), len(t), bool(alarm)),
     )  # fmt: skip
+
+
+def _memory(residual: np.ndarray) -> float:
+    """How much nights that resemble their neighbours widen a slope's std (first-order autoregression)."""
+    total = float(residual @ residual)
+    similarity = float(residual[1:] @ residual[:-1]) / total if total else 0.0
+    similarity = min(max(similarity, 0.0), _MOST_SIMILAR)
+    return float(np.sqrt((1 + similarity) / (1 - similarity)))
 
 
 def _sentence(joint: str, percent: float, percent_std: float, nights: int, alarm: bool) -> str:

@@ -25,10 +25,10 @@ from service.rest.routes import (
 _ROUTERS = (robots, recordings, excitations, analyses, calibrations, nights, access, status)
 _ABOUT = """Record robots, identify their dynamics with uncertainty, find the physics a simulation left out.
 
-Send `Authorization: Bearer TOKEN`. Scopes: **read** looks, **run** uploads and computes, **accept** puts
-calibrations in force, **admin** manages robots and tokens. POST requests take an `Idempotency-Key`. What takes
-long is answered with 202 and a `Location`. Errors are `application/problem+json` with a stable `code`, the `cause`
-and the `remedy`."""
+Send `Authorization: Bearer TOKEN`. Scopes: **read** looks, **run** uploads, computes and moves, **accept**
+puts calibrations in force, **admin** manages robots and tokens. POST requests take an `Idempotency-Key`.
+What takes long is answered with 202 and a `Location`. Errors are `application/problem+json` with a stable
+`code`, the `cause` and the `remedy`."""
 
 
 def create_app(lab: Lab) -> FastAPI:

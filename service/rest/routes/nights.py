@@ -29,7 +29,7 @@ class NightRequest(BaseModel):
     outcome: Literal["accepted", "proposed", "kept", "skipped", "failed"]
     sentence: str = Field(max_length=4000, pattern=r"^[^\x00]*$")
     estimate_id: Identifier | None = None
-    alarms: list[dict[Literal["kind", "sentence"], Text]] = Field(default=[], max_length=100)
+    alarms: list[dict[Literal["kind", "subject", "sentence"], Text]] = Field(default=[], max_length=100)
     diagnosis_id: Identifier | None = None
 
 
