@@ -15,9 +15,12 @@ if TYPE_CHECKING:
 def nightly(
     robot: Annotated[str, typer.Argument(help="Serial number of the robot, as the server knows it.")],
     recording: Annotated[
-        str, typer.Option(help="Identifier of the recording on the server, or a log file to upload.")
-    ],
+        str | None, typer.Option(help="Recording on the server, or a log file to upload.")
+    ] = None,
     validation: Annotated[str | None, typer.Option(help="Held-out recording or file.")] = None,
+    excitation: Annotated[
+        str | None, typer.Option(help="Excitation on the server: record the robot with it.")
+    ] = None,
     server: Annotated[
         str | None,
         typer.Option(help="Address of residuum serve; the configuration's host and port when left out."),
@@ -30,21 +33,25 @@ def nightly(
 ) -> None:
     """Recalibrate for the night: identify, diagnose, compare with what is in force, propose or accept, alert.
 
-    The token needs the scope run, and accept where the policy may accept by itself.
+    With --excitation the robot moves: warm-up, run, validation; only where it is cleared for that. The token
+    needs the scope run, and accept where the policy may accept by itself.
 
     Example: residuum nightly IR361-0007 --recording run.mcap --validation validation.mcap --token-file token
     """
     from service.cli.output import print_json
     from service.config import load_config
+    from service.errors import UsageError
     from service.nightly.alerts import send_alarms
     from service.nightly.client import RestClient
     from service.nightly.night import Night, NightPlan
 
+    if (recording is None) == (excitation is None):
+        raise UsageError("Give either --recording, a run to identify, or --excitation, a motion to record.")
     settings = load_config(config)
     address = server or f"http://{settings.server.host}:{settings.server.port}"
     client = RestClient(address, _token(token_file))
-    names = [client.stored(robot, given) for given in (recording, validation) if given is not None]
-    plan = NightPlan(robot, names[0], names[1] if len(names) > 1 else None)
+    names = [client.stored(robot, given) if given else None for given in (recording, validation)]
+    plan = NightPlan(robot, names[0], names[1], excitation)
     report = Night(client, settings.nightly).run(plan)
     unsent = send_alarms(settings.alerts, robot, report.fresh, report.outcome)
     if as_json:

@@ -32,13 +32,15 @@ class NightPlan:
 
     Attributes:
         robot: serial.
-        recording: identifier of the recording to identify.
+        recording: identifier of the recording to identify; None records the robot.
         validation: identifier of a held-out recording, or None.
+        excitation: identifier of the motion to record.
     """
 
     robot: str
-    recording: str
+    recording: str | None = None
     validation: str | None = None
+    excitation: str | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ class Night:
         """
         robot = self._get(f"/v1/robots/{plan.robot}")
         last = self._last_night(plan.robot)
-        busy = self._why_busy(robot)
+        busy = self._why_not(plan, robot)
         report = NightReport("skipped", busy) if busy else self._leased(plan, robot, last)
         known = {
             (alarm["kind"], alarm["subject"]) for alarm in (last or {}).get("content", {}).get("alarms", [])
@@ -112,7 +114,9 @@ class Night:
         finally:
             self._client.call("DELETE", f"/v1/robots/{plan.robot}/lease")
 
-    def _why_busy(self, robot: dict[str, Any]) -> str:
+    def _why_not(self, plan: NightPlan, robot: dict[str, Any]) -> str:
+        if plan.recording is None and not robot["unattended"]:
+            return f"Robot {robot['serial']} is not cleared for unattended motion; the night was skipped."
         me = self._get("/v1/me")["name"]
         lease = robot["lease"]
         if lease is not None and lease["owner"] != me:
@@ -121,6 +125,8 @@ class Night:
         return ""
 
     def _measured(self, plan: NightPlan, robot: dict[str, Any], last: dict[str, Any] | None) -> NightReport:
+        if plan.recording is None:
+            plan = self._recorded(plan, robot)
         body = {"recording_id": plan.recording, "validation_id": plan.validation}
         fit = self._post("/v1/fits", body, "fit")
         asked = self._post("/v1/diagnoses", body, "diagnosis")
@@ -130,6 +136,34 @@ class Night:
         decision = decide(evidence, self._settings)
         outcome = self._apply(decision, estimate_id)
         return NightReport(outcome, decision.sentence, estimate_id, diagnosis["id"], decision.alarms)
+
+    def _recorded(self, plan: NightPlan, robot: dict[str, Any]) -> NightPlan:
+        """Move the robot: warm-up, run, validation motion."""
+        warm_up = self._settings.warm_up_periods
+        if warm_up:
+            self._run(plan, robot, "warm-up", {"periods": warm_up})
+        run = self._run(plan, robot, "run", {"periods": self._settings.periods})
+        held_out = self._run(plan, robot, "validation", {"is_validation": True, "seed": 1})
+        return NightPlan(plan.robot, run, held_out)
+
+    def _run(self, plan: NightPlan, robot: dict[str, Any], step: str, options: dict[str, Any]) -> str:
+        body = {"robot_serial": plan.robot, "excitation_id": plan.excitation, "unattended": True, **options}
+        made = self._post("/v1/runs", body, step)
+        self._post(f"/v1/runs/{made['id']}/confirm", {"robot_name": robot["name"]}, f"{step}-confirm")
+        deadline_s = time.monotonic() + self._settings.wait_s
+        while time.monotonic() < deadline_s:
+            found = self._get(f"/v1/runs/{made['id']}")
+            if found["state"] == "finished":
+                return str(found["recording_id"])
+            if found["state"] in ("failed", "aborted", "interrupted"):
+                error = found["error"] or {"cause": f"it was {found['state']}", "remedy": "look at the robot"}
+                raise NightFailed(f"The {step} did not succeed: {error['cause']}", error["remedy"])
+            time.sleep(_LOOK_S)
+        self._client.call("POST", f"/v1/runs/{made['id']}/abort")
+        raise NightFailed(
+            f"The {step} took longer than {self._settings.wait_s:g} s",
+            "look at the robot; raise nightly.wait_s",
+        )
 
     def _evidence(
         self, robot: dict[str, Any], estimate_id: str, diagnosis: dict[str, Any], last: dict[str, Any] | None

@@ -19,10 +19,11 @@ from service.rest.routes import (
     nights,
     recordings,
     robots,
+    runs,
     status,
 )
 
-_ROUTERS = (robots, recordings, excitations, analyses, calibrations, nights, access, status)
+_ROUTERS = (robots, recordings, excitations, runs, analyses, calibrations, nights, access, status)
 _ABOUT = """Record robots, identify their dynamics with uncertainty, find the physics a simulation left out.
 
 Send `Authorization: Bearer TOKEN`. Scopes: **read** looks, **run** uploads, computes and moves, **accept**

@@ -16,6 +16,7 @@ from service.config import Config
 from service.errors import UsageError
 from service.faults import fault_of
 from service.jobs import resume_jobs
+from service.runs import Runs
 from service.slot import end_executor, spawn_executor
 from service.store.database import Database
 from service.tokens import FailureBrake, first_token
@@ -46,6 +47,7 @@ class Lab:
         self.archive = Archive(storage.folder / "recordings", limits)
         self.brake = FailureBrake(config.access.failures, config.access.failure_window_s)
         self.compute = Compute(self.database, self.archive, storage.folder, config.compute)
+        self.runs = Runs(self.database, self.archive, storage.folder / "runs")
         self._reader: ProcessPoolExecutor | None = None
 
     def open(self) -> tuple[str | None, list[str]]:
@@ -63,11 +65,13 @@ class Lab:
             ]
             for job in found:
                 note(session, "server", "job.interrupted", job.id, state=job.state)
+        sentences += self.runs.recover()
         self.compute.start()
         return token, sentences
 
     def close(self) -> None:
         """Stop workers and let go of database and folder."""
+        self.runs.close()
         self.compute.stop()
         if self._reader is not None:
             end_executor(self._reader)

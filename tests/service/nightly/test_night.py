@@ -102,3 +102,29 @@ def test_the_command_says_what_is_missing(capsys, monkeypatch, tmp_path):
     code, out, err = logs.command(capsys, *arguments)
     assert code == 1
     assert "does not answer" in err
+
+
+def test_a_night_records_only_a_robot_that_is_cleared(lab):
+    client = InProcess(lab.client("operator"))
+    body = {
+        "robot_serial": "V",
+        "harmonics": 2,
+        "starts": 1,
+        "refined": 1,
+        "fundamental_hz": 0.25,
+        "rate_hz": 100,
+    }
+    excitation = client.call("POST", "/v1/excitations", body)
+    lab.finished(f"/v1/excitations/{excitation['id']}")
+    settings = NightlySection(warm_up_periods=1, periods=4)
+    plan = NightPlan("V", excitation=excitation["id"])
+    report = Night(client, settings).run(plan)
+    assert report.outcome == "skipped"
+    assert "not cleared for unattended motion" in report.sentence
+    assert client.call("GET", "/v1/runs")["items"] == []
+    register(lab, "V", simulated=True, unattended=True)
+    report = Night(client, settings).run(plan)
+    runs = client.call("GET", "/v1/runs")["items"]
+    assert [run["state"] for run in runs] == ["finished"] * 3, runs
+    assert report.outcome in ("proposed", "kept"), report
+    assert report.estimate_id

@@ -121,6 +121,42 @@ def test_kill_9_loses_no_accepted_request_and_leaves_nobody_behind(tmp_path, por
     assert code == 0
 
 
+def test_kill_9_in_a_run_stops_the_robot_and_salvages_the_log(tmp_path, port):
+    server = Process(tmp_path, port)
+    server.call("POST", "v1/robots", {"serial": "V", "preset": "ir361", "simulated": True})
+    body = {
+        "robot_serial": "V",
+        "starts": 1,
+        "refined": 1,
+        "harmonics": 2,
+        "fundamental_hz": 0.25,
+        "rate_hz": 100,
+    }
+    design = server.call("POST", "v1/excitations", body)
+    while server.call("GET", f"v1/excitations/{design['id']}")["job"]["state"] != "done":
+        time.sleep(0.1)
+    server.call("POST", "v1/robots/V/lease", {"minutes": 5})
+    run = server.call(
+        "POST", "v1/runs", {"robot_serial": "V", "excitation_id": design["id"], "periods": 2000}
+    )
+    server.call("POST", f"v1/runs/{run['id']}/confirm", {"robot_name": "ir361"})
+    while ((server.call("GET", f"v1/runs/{run['id']}")["progress"] or {}).get("cycle") or 0) < 100:
+        time.sleep(0.1)
+    acquisition = workers_of(server.process.pid)
+    server.kill()
+    again = Process(tmp_path, port, server.token)
+    try:
+        assert f"Run {run['id']} of robot V was interrupted." in again.said["interrupted"]
+        assert not any(map(is_alive, acquisition))
+        found = again.call("GET", f"v1/runs/{run['id']}")
+        assert (found["state"], found["error"]["code"]) == ("interrupted", "interrupted")
+        recording = again.call("GET", f"v1/recordings/{found['recording_id']}")
+        assert recording["simulated"]
+        assert recording["facts"]["duration_s"] > 0.5
+    finally:
+        again.stop()
+
+
 def test_the_example_configuration_is_printed(capsys):
     code, out, err = command(capsys, "serve", "--print-config")
     assert (code, err) == (0, "")
