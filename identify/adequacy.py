@@ -93,7 +93,7 @@ def structured_covariance(
         channels, count = block.target.shape
         rows = slice(first, first + channels * count)
         scores = (solution.jacobian[rows] * solution.whitened[rows, None]).reshape(channels, count, size)
-        meat += _bartlett(scores.sum(axis=0), max(count // _CORRELATED_SHARE, 2))
+        meat += bartlett(scores.sum(axis=0), max(count // _CORRELATED_SHARE, 2))
         if motion is not None:
             meat += _region_clusters(block, scores, motion[index])
         first += channels * count
@@ -114,7 +114,7 @@ def _region_clusters(block: Block, scores: FloatArray, motion: FloatArray) -> Fl
     return meat
 
 
-def _bartlett(scores: FloatArray, lags: int) -> FloatArray:
+def bartlett(scores: FloatArray, lags: int) -> FloatArray:
     """Long-run covariance of periodic scores (B, P), positive semidefinite by construction."""
     count = len(scores)
     taper = np.zeros(count)

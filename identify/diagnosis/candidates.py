@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from identify.adequacy import bartlett
 from identify.diagnosis.problem import Problem
 from identify.physics.effect import Effect, Place
 from identify.rotations import FloatArray
@@ -17,6 +18,7 @@ from identify.rotations import FloatArray
 _SWALLOWED = 1.0 - 1e-5
 # two columns of one effect closer than this are one
 _SAME = 1e-6
+_CORRELATED_SHARE = 100  # of a run without replicates: how far its residual stays correlated
 
 
 def log_chance(gain: FloatArray, width: int) -> FloatArray:
@@ -85,6 +87,14 @@ def shapes_of(effect: Effect) -> list[dict[str, float]]:
     return [dict(zip(names, point, strict=True)) for point in itertools.product(*(s.grid for s in effect.shapes))]
 
 
+def at_an_end(effect: Effect, shape: Mapping[str, float]) -> bool:
+    """Whether a continuous shape stands at an end of its range: without replicates that is no evidence."""
+    return any(
+        s.continuous and len(s.grid) > 3 and np.isclose(shape[s.name], (s.grid[0], s.grid[-1]), rtol=0.03, atol=0.0).any()
+        for s in effect.shapes
+    )
+
+
 def project(basis: FloatArray, columns: FloatArray) -> FloatArray:
     """Take the baseline out of columns, twice for rounding's sake."""
     columns = columns - basis @ (basis.T @ columns)
@@ -146,6 +156,25 @@ def _pivoted(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return q, r * safe[order], order
 
 
+def _inflation(problem: Problem, q: FloatArray, rest: FloatArray) -> FloatArray:
+    """How much the variance of each direction exceeds that of white noise, shape (j,); 1 with replicates.
+
+    Without replicates the residual's own correlation stands for the noise's: Newey-West over the scores of the
+    direction, the effect itself taken out.
+    """
+    if all(noise.replicated for noise in problem.fit.noises):
+        return np.ones(q.shape[1])
+    total, first = np.zeros(q.shape[1]), 0
+    for block in problem.blocks:
+        channels, count = block.target.shape
+        rows = slice(first, first + channels * count)
+        scores = (q[rows] * rest[rows, None]).reshape(channels, count, -1)
+        for part in scores:
+            total += np.diag(bartlett(part, max(count // _CORRELATED_SHARE, 2)))
+        first += channels * count
+    return np.maximum(total, 1.0)
+
+
 def _physical(
     problem: Problem,
     effect: Effect,
@@ -162,7 +191,7 @@ def _physical(
         toward = q.T @ residual
         values = np.zeros(len(effect.coefficients))
         values[kept] = np.linalg.solve(r, toward)
-        gain = float(toward @ toward)
+        gain = float(np.sum(toward**2 / _inflation(problem, q, residual - q @ toward)))
         if effect.allowed(problem.scene, place, values, shape):
             return Trial(effect, place, shape, kept, q, r, gain, values, norms)
         signs = np.array([effect.coefficients[k].sign for k in kept])
@@ -190,9 +219,11 @@ def all_trials(
         The trials that the baseline does not swallow.
     """
     keys: list[tuple[Effect, Place, dict[str, float]]] = []
+    inside = all(noise.replicated for noise in problem.fit.noises)
     for effect in (item for item in effects if not item.progressive):
+        shapes = shapes_of(effect)
         for place in effect.places(problem.scene):
-            keys += [(effect, place, shape) for shape in shapes_of(effect)]
+            keys += [(effect, place, shape) for shape in shapes if inside or not at_an_end(effect, shape)]
     columns = []
     for effect, place, shape in keys:
         key = (effect.name, place, tuple(shape.values()))

@@ -13,7 +13,7 @@ from identify.diagnosis.adequacy import Adequacy, examine
 from identify.diagnosis.augmented import Augmented, fit_jointly
 from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, pick_progress
 from identify.diagnosis.blind_spots import blind_spots, place_name
-from identify.diagnosis.candidates import all_trials, best_by_place, log_chance
+from identify.diagnosis.candidates import all_trials, at_an_end, best_by_place, log_chance
 from identify.diagnosis.describe import carrying_channels, parameters_of, readable_place, sentence_of, where_of
 from identify.diagnosis.findings import (
     ChannelFit,
@@ -77,6 +77,11 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
     selection = backward(problem, select(problem, effects, LEVEL_NAMED * options.level, rng), LEVEL_NAMED * options.level)
     selection, rest = _gate(problem, selection, options)
     augmented, renewed = fit_jointly(problem, [item.trial for item in selection.named])
+    if not all(noise.replicated for noise in fit.noises):
+        firm = [n for n, a in zip(selection.named, augmented.additions, strict=True) if not at_an_end(a.effect, a.shape)]
+        if len(firm) < len(selection.named):
+            selection = rebased(problem, selection, firm)
+            augmented, renewed = fit_jointly(problem, [item.trial for item in firm])
     shown = held_out(fit, augmented, other, rng) if other is not None else None
     findings = _findings(renewed, selection, augmented)
     drifting = {item.place.joint for item, _ in progress if item.effect.name == "torque_constant_drift"}
@@ -84,7 +89,7 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
     findings += tuple(c for c in constants if fit.model.robot.joint_names.index(c.joint) not in drifting)
     findings += tuple(_progress_finding(problem, item, rivals) for item, rivals in progress)
     tones = foreign_tones(problem)
-    unexplained = _unexplained(problem, rest, tones, options)
+    unexplained = _unexplained(problem, rest, tones, options, bool(findings))
     spots = blind_spots(problem, effects, selection.first, selection.null, LEVEL_NAMED * options.level)
     return Diagnosis(
         _verdict(findings, unexplained, fit),
@@ -108,6 +113,8 @@ def _warnings(fit: Fit) -> tuple[str, ...]:
 
 def _gate(problem: Problem, selection: Selection, options: DiagnoseOptions) -> tuple[Selection, Adequacy]:
     """Take back names that leave too much on their own channels, and those that then no longer stand out."""
+    if not all(noise.replicated for noise in problem.fit.noises):
+        return selection, Adequacy(1.0, {}, (), {})  # without replicates nothing says what noise would leave
     level = LEVEL_REST * options.level
     rest = examine(problem, selection.basis, selection.residual)
     while True:
@@ -214,10 +221,22 @@ def _progress_parameters(item: Progress) -> tuple[FoundParameter, ...]:
     return tuple(result)
 
 
-def _unexplained(problem: Problem, rest: Adequacy, tones: list[ForeignTone], options: DiagnoseOptions) -> Unexplained | None:
+def _unjudged(problem: Problem) -> Unexplained:
+    """Without replicates a name may stand, but nothing says whether the rest is noise."""
+    channels = tuple(channel for block in problem.blocks for channel in block.channels)
+    return Unexplained(
+        channels, (), 1.0,
+        "The run does not repeat, so nothing tells whether what is left is noise or more physics; the names above are those that "
+        "fit best and may be wrong. Record whole periods to judge them.",
+    )
+
+
+def _unexplained(
+    problem: Problem, rest: Adequacy, tones: list[ForeignTone], options: DiagnoseOptions, named: bool
+) -> Unexplained | None:
     level = LEVEL_REST * options.level
     if problem.fit.window is None:
-        return None
+        return _unjudged(problem) if named else None
     if rest.p_value > level and not tones:
         return None
     structures = [s for s in rest.structures if s.p_value < level]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.diagnosis.candidates import Trial, all_trials, best_by_place, project, refine, trial
+from identify.diagnosis.candidates import Trial, all_trials, at_an_end, best_by_place, project, refine, trial
 from identify.diagnosis.describe import carrying_channels
 from identify.diagnosis.null import FamilyNull, family_null
 from identify.diagnosis.problem import Problem
@@ -17,6 +17,7 @@ _MOST = 4  # effects in one recording
 _CLOSE = 12.0  # penalised gain within which candidates are refined and compared
 _POLISH = 0.04  # share of a stronger effect's gain below which a further name on its channels says nothing
 _RIVAL_GAP = 6.0  # BIC difference below which the data do not decide
+_SIZE_FLOOR = 0.01  # of a channel's signal: systematic error that real recordings keep
 _RIVAL_COSINE = 0.95
 
 
@@ -103,7 +104,7 @@ def select(problem: Problem, effects: list[Effect], level: float, rng: np.random
         if not ranked or null.p_value(ranked[0].log_p) > level:
             break
         winner, rivals = _decide(problem, basis, residual, ranked)
-        if _only_polish(problem, winner, named):
+        if _only_polish(problem, winner, named) or _too_small(problem, winner):
             break
         named.append(Named(winner, null.p_value(winner.log_p), rivals))
         columns = np.hstack([problem.columns(winner.effect, winner.place, winner.shape), tangent_columns(problem, winner)])
@@ -120,6 +121,18 @@ def _only_polish(problem: Problem, winner: Trial, named: list[Named]) -> bool:
     )
 
 
+def _too_small(problem: Problem, item: Trial) -> bool:
+    """Whether, without replicates, an effect is below the floor that every real recording keeps."""
+    if all(noise.replicated for noise in problem.fit.noises):
+        return False
+    if at_an_end(item.effect, item.shape):
+        return True
+    share = problem.columns(item.effect, item.place, item.shape) @ item.values
+    whole = problem.whiten([block.target[:, None, :] for block in problem.blocks])[:, 0]
+    rows = problem.channel_slices[carrying_channels(problem, share)[0]]
+    return bool(np.linalg.norm(share[rows]) < _SIZE_FLOOR * np.linalg.norm(whole[rows]))
+
+
 def _home(problem: Problem, item: Trial) -> tuple[str, ...]:
     return carrying_channels(problem, problem.columns(item.effect, item.place, item.shape) @ item.values)
 
@@ -131,6 +144,8 @@ def _decide(
     lead = max(item.penalised for item in ranked)
     near = [item for item in ranked if item.penalised > 0.6 * lead - _CLOSE][:14]
     refined = sorted((refine(problem, basis, residual, item) for item in near), key=lambda item: -item.penalised)
+    if not all(noise.replicated for noise in problem.fit.noises):
+        refined = [item for item in refined if not at_an_end(item.effect, item.shape)] or refined[:1]
     winner = refined[0]
     rivals = [
         item

@@ -20,6 +20,7 @@ def diagnose(
     report: Annotated[Path | None, typer.Option(help="Where to write the report for people (one HTML page that prints).")] = None,
     model: Annotated[str | None, typer.Option(help="combined, internal or external; the richest the log allows when left out.")] = None,
     free: Annotated[bool, typer.Option("--free", help="Treat the run as non-periodic.")] = False,
+    periodic: Annotated[bool, typer.Option("--periodic", help="Insist on a period, whatever kind of run the log states.")] = False,
     bandwidth: Annotated[float | None, typer.Option(help="Non-periodic: cut-off of the differentiating filter [Hz].")] = None,
     decimate: Annotated[int | None, typer.Option(help="Non-periodic: keep every so many samples after filtering.", min=1)] = None,
     trim: Annotated[int, typer.Option(help="Non-periodic: samples to drop at either end.", min=0)] = 0,
@@ -37,7 +38,7 @@ def diagnose(
 
     check_writable(output, "the diagnosis")
     check_writable(report, "the report")
-    options = FitOptions(kind=model, periodic=False if free else None, free=FreeOptions(bandwidth, decimate, trim))
+    options = FitOptions(kind=model, periodic=False if free else True if periodic else None, free=FreeOptions(bandwidth, decimate, trim))
     found = diagnose_log(run, robot, validate, options, against=against)
     if output is not None:
         write_text(output, to_json(found.content), "the diagnosis")

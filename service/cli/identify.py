@@ -20,6 +20,7 @@ def identify(
     estimator: Annotated[str, typer.Option(help="markov (weighted), ols, or ml (encoder noise too).")] = "markov",
     nominal_constants: Annotated[bool, typer.Option("--nominal-constants", help="Take the torque constants of the robot file as exact.")] = False,
     free: Annotated[bool, typer.Option("--free", help="Treat the run as non-periodic.")] = False,
+    periodic: Annotated[bool, typer.Option("--periodic", help="Insist on a period, whatever kind of run the log states.")] = False,
     bandwidth: Annotated[float | None, typer.Option(help="Non-periodic: cut-off of the differentiating filter [Hz].")] = None,
     decimate: Annotated[int | None, typer.Option(help="Non-periodic: keep every so many samples after filtering.", min=1)] = None,
     trim: Annotated[int, typer.Option(help="Non-periodic: samples to drop at either end.", min=0)] = 0,
@@ -41,7 +42,7 @@ def identify(
     options = FitOptions(
         kind=model,
         estimator=estimator,
-        periodic=False if free else None,
+        periodic=False if free else True if periodic else None,
         free=FreeOptions(bandwidth, decimate, trim, slow=slow),
         nominal_constants=nominal_constants,
     )

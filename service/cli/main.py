@@ -22,6 +22,7 @@ COMMANDS: Mapping[str, tuple[str, str]] = {
     "import": ("import_", "A foreign recording (csv, npz, db3, mcap) as a log."),
     "serve": ("serve", "The REST API and the lab's web page."),
     "nightly": ("nightly", "Recalibrate for the night: compare with what is in force, propose or accept, alert."),
+    "doctor": ("doctor", "Is this machine fit to record, and what to do where it is not."),
     "recover": ("recover", "A broken log's intact part as a valid log."),
 }
 _INTERRUPTED = 130  # what shells report for Ctrl-C
