@@ -14,7 +14,7 @@ from drivers.virtual.plant_file import JointPlant, NoiseSpec, PlantSpec, PlateSp
 from drivers.virtual.rigid import RigidPlant
 from drivers.virtual.urdf_tree import MOVING, read_tree
 
-# Friction where nobody knows it: the reference robot's shares of its effort limit (method.md section 7).
+# Friction where nobody knows it: the reference robot's shares of its effort limit (the reference robot).
 _COULOMB_SHARE = 0.06
 _VISCOUS_SHARE = 0.05
 _NOISE_SHARE = 0.006

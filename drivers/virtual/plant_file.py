@@ -39,7 +39,7 @@ class LinkInertial(_Part):
 class GravitySpring(_Part):
     """A spring between two links: two attachment radii and a rest length, or a Fourier series of torque.
 
-    The exact spring resists with k A B sin(q - phi) (1 - l0 / l) (physics.md section 4).
+    The exact spring resists with k A B sin(q - phi) (1 - l0 / l) (catalogue of effects, springs).
     """
 
     stiffness_n_m: NonNegative = 0.0
@@ -80,7 +80,7 @@ class NoiseSpec(_Part):
     """Noise of every channel per sample: std, colour (AR(1) coefficient) and correlation."""
 
     joint_torque_nm: tuple[NonNegative, ...] = ()
-    wrench: Vector6 = (10.54, 10.88, 4.81, 11.61, 11.33, 3.15)  # method.md section 6, N and N.m
+    wrench: Vector6 = (10.54, 10.88, 4.81, 11.61, 11.33, 3.15)  # Verdonck 2001, N and N.m
     joint_ar1: Colour = 0.0
     wrench_ar1: Colour = 0.0
     wrench_correlation: Correlation = 0.0

@@ -16,7 +16,7 @@ def draw_effect(
 
     Args:
         plant: the robot.
-        name: effect, as physics.md spells it.
+        name: effect, as the catalogue spells it.
         random: where the draw comes from.
         size_factor: multiplies the drawn size, to walk below what can be seen.
     """

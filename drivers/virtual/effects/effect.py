@@ -20,7 +20,7 @@ CHANNELS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 @dataclass(frozen=True)
 class EffectSpec:
-    """One effect to be simulated: name as in physics.md, place, and parameters in SI units."""
+    """One effect to be simulated: name as in the catalogue, place, and parameters in SI units."""
 
     name: str
     joint: str | None = None

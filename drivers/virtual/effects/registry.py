@@ -55,7 +55,7 @@ def default_sizes(plant: PlantSpec, name: str, joint: str | None = None) -> dict
 
 
 def catalogued() -> tuple[str, ...]:
-    """Names of the effects that physics.md lists."""
+    """Names of the effects of the catalogue."""
     return tuple(name for name, kind in effect_classes().items() if kind.catalogued)
 
 

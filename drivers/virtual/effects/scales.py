@@ -10,7 +10,7 @@ from drivers.virtual.plant_file import LinkInertial, PlantSpec
 from drivers.virtual.rigid import RigidPlant
 from drivers.virtual.urdf_tree import read_tree
 
-_RUN_S = 160.0  # sixteen periods of ten seconds (method.md section 3)
+_RUN_S = 160.0  # sixteen periods of ten seconds (Verdonck 2001, section 4)
 
 
 def coulomb_nm(plant: PlantSpec, j: int) -> float:

@@ -18,7 +18,7 @@ from drivers.virtual.trajectories import random_fourier
 
 T_S = np.arange(0.0, 10.0, 1.0 / 150.0)
 
-# physics.md sections 2 to 5, spelled as there
+# the catalogue to 5, spelled as there
 CATALOGUE = {
     "stribeck_friction",
     "asymmetric_viscous_friction",
