@@ -155,7 +155,7 @@ def _to_block(
 
 
 def _bins(signal: Signal, window: PeriodWindow) -> int:
-    return max(int(round(signal.rate_hz * window.period_s)), 4)
+    return max(round(signal.rate_hz * window.period_s), 4)
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class FitOptions:
     kind: str | None = None
     estimator: str = "markov"
     periodic: bool | None = None
-    free: FreeOptions = FreeOptions()
+    free: FreeOptions = field(default_factory=FreeOptions)
     nominal_constants: bool = False
 
 

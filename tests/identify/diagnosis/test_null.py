@@ -1,5 +1,7 @@
 """The family's own null distribution, against brute force."""
 
+import itertools
+
 import numpy as np
 
 from identify.diagnosis.candidates import Trial, log_chance
@@ -37,5 +39,5 @@ def test_copies_of_one_candidate_count_once():
 def test_probabilities_stay_ordered_where_they_underflow():
     null = FamilyNull(50.0)
     p = [null.p_value(float(log_chance(np.array(g), 2))) for g in (10.0, 100.0, 500.0, 1200.0)]
-    assert all(a > b > 0.0 for a, b in zip(p, p[1:], strict=False))
+    assert all(a > b > 0.0 for a, b in itertools.pairwise(p))
     np.testing.assert_allclose(log_chance(np.array([5.0, 50.0, 800.0]), 1)[:2], [-3.67597, -26.9], rtol=0.02)
