@@ -109,7 +109,8 @@ def _socket(host: str, port: int):  # noqa: ANN202  (socket is imported late)
     sock = None
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        sock = socket.socket(family)
+        # with the protocol named, the event loop sends small answers at once (it looks for it)
+        sock = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind((host, port))
     except OSError as error:
