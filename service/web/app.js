@@ -31,7 +31,7 @@ function table(headings, rows, empty) {
 const number = text => element("td", { class: "number" }, text);
 const mark = (text, kind) => element("span", { class: `mark ${kind}` }, text);
 const when = text => new Date(text).toLocaleString("en-GB", { day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit" });
-const KIND = { accepted: "good", done: "good", consistent: "good", explained: "good", proposed: "warn", running: "warn", queued: "warn",
+const KIND = { accepted: "good", finished: "good", recording: "warn", aborted: "bad", done: "good", consistent: "good", explained: "good", proposed: "warn", running: "warn", queued: "warn",
   partly_explained: "warn", interrupted: "bad", failed: "bad", unexplained: "bad" };
 const state = text => mark(text.replaceAll("_", " "), KIND[text] || "quiet");
 const simulated = flag => flag ? mark("simulated", "warn") : "";
@@ -112,6 +112,21 @@ function showRecordings(page) {
   ]), "No recording yet."));
 }
 
+async function abort(id) {
+  const answer = await fetch(`/v1/runs/${id}/abort`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
+  if (!answer.ok) throw new Error((await answer.json()).detail);
+}
+
+function showRuns(page) {
+  show("runs", table(["asked", "robot", "state", "length", "", ""], page.items.map(item => [
+    when(item.created_at), item.robot_serial, state(item.state), number(`${item.preview.duration_s.toFixed(0)} s`),
+    item.state === "recording" && item.progress
+      ? element("span", {}, element("progress", { value: item.progress.cycle, max: item.progress.cycles || 1 }), ` ${item.progress.remaining_s.toFixed(0)} s left `, element("button", { onclick: () => abort(item.id).catch(fail) }, "Abort"))
+      : item.error ? element("span", { class: "bad" }, `${item.error.cause}; ${item.error.remedy}.`) : "",
+    simulated(item.simulated),
+  ]), "No run yet."));
+}
+
 function showJobs(page) {
   show("jobs", table(["asked", "job", "state", ""], page.items.map(item => [
     when(item.created_at), item.kind, state(item.state),
@@ -123,7 +138,7 @@ function showJobs(page) {
 async function refresh() {
   const robots = await get("/v1/robots");
   showRobots(robots);
-  const lists = { diagnoses: showDiagnoses, calibrations: showCalibrations, nights: showNights, recordings: showRecordings, jobs: showJobs };
+  const lists = { diagnoses: showDiagnoses, calibrations: showCalibrations, nights: showNights, recordings: showRecordings, runs: showRuns, jobs: showJobs };
   await Promise.all([showConstants(robots), ...Object.entries(lists).map(async ([name, draw]) => draw(await get(`/v1/${name}?limit=8`)))]);
   const health = await get("/v1/health");
   $("status").textContent = `${health.status === "ok" ? "running" : "failing"}, version ${health.version}, ${(health.disk_free_mb / 1000).toFixed(0)} GB free`;
