@@ -59,6 +59,18 @@ class Progress:
         """Channels that carry the change, strongest first."""
         return carrying_channels(problem, problem.whiten(self.raw(problem)) @ self.values)
 
+    def reach(self, problem: Problem) -> set[str]:
+        """Channels that the change may concern: all that its columns touch where it dies out, else those that carry it."""
+        if self.effect.settling is None:
+            return set(self.channels(problem))
+        raw = self.raw(problem)
+        return {
+            channel
+            for block, part in zip(problem.blocks, raw, strict=True)
+            for channel, columns in zip(block.channels, part, strict=True)
+            if columns.any()
+        }
+
     def mean_columns(self, problem: Problem) -> FloatArray:
         """What the change leaves in the mean over the periods: within a period it moves on, whitened (rows, k)."""
         shaped = [
@@ -239,7 +251,7 @@ def pick_progress(problem: Problem, effects: list[Effect], level: float) -> list
         At most three effects, each with the names of its rivals.
     """
     tests = [item for item in progressive_tests(problem, effects) if item.p_value <= level and item.gain > _PRICE * (item.width + 1)]
-    home = {id(item): set(item.channels(problem)) for item in tests}
+    home = {id(item): item.reach(problem) for item in tests}
     result: list[tuple[Progress, tuple[str, ...]]] = []
     while tests and len(result) < _MOST:
         best = max(tests, key=lambda item: item.gain - _PRICE * item.width)

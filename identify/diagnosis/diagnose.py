@@ -87,7 +87,9 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
     drifting = {item.place.joint for item, _ in progress if item.effect.name == "torque_constant_drift"}
     constants = _constant_findings(problem, augmented, rest, LEVEL_CONSTANT * options.level)
     findings += tuple(c for c in constants if fit.model.robot.joint_names.index(c.joint) not in drifting)
-    findings += tuple(_progress_finding(problem, item, rivals) for item, rivals in progress)
+    known = {(f.effect, f.joint, f.channel) for f in findings}
+    changing = [_progress_finding(problem, item, rivals) for item, rivals in progress]
+    findings += tuple(f for f in changing if (f.effect, f.joint, f.channel) not in known)
     tones = foreign_tones(problem)
     unexplained = _unexplained(problem, rest, tones, options, bool(findings))
     spots = blind_spots(problem, effects, selection.first, selection.null, LEVEL_NAMED * options.level)
