@@ -49,9 +49,9 @@ class Archive:
             raise Unusable(f"'{sha256[:80]}' is no SHA-256 digest", "use the digest of a stored recording")
         return self.folder / sha256[:2] / f"{sha256}.mcap"
 
-    def receive(self) -> Incoming:
-        """Open a place for a new file."""
-        return Incoming(self)
+    def receive(self, is_limited: bool = True) -> Incoming:
+        """Open a place for a new file; uploads are limited, the server's own recordings are not."""
+        return Incoming(self, is_limited)
 
     def keep(self, path: Path, sha256: str) -> Path:
         """Move a checked file to its place; the same bytes twice are kept once."""
@@ -72,7 +72,8 @@ class Archive:
 class Incoming:
     """A file that is arriving; removed unless it is kept."""
 
-    def __init__(self, archive: Archive) -> None:
+    def __init__(self, archive: Archive, is_limited: bool = True) -> None:
+        self._is_limited = is_limited
         handle, name = tempfile.mkstemp(dir=archive.incoming, suffix=".mcap")
         self.path, self.size_bytes = Path(name), 0
         self._limits = archive.limits
@@ -108,6 +109,8 @@ class Incoming:
         self.path.unlink(missing_ok=True)
 
     def _refuse_size(self, size_bytes: int) -> None:
+        if not self._is_limited:
+            return
         limit = self._limits.upload_bytes
         if size_bytes > limit:
             raise TooLarge(
@@ -135,9 +138,7 @@ def inspect_log(path: str) -> dict[str, Any]:
     from daq.log_reader import read_recording
 
     recording = read_recording(path)
-    streams = {
-        name: getattr(recording, name) for name in ("joint_states", "motor_currents", "wrench", "setpoints")
-    }
+    streams = {name: getattr(recording, name) for name in ("joint_states", "motor_currents", "wrench", "setpoints")}
     stamps = recording.joint_states.stamp_ns
     return {
         "robot": recording.metadata.get("robot", ""),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -15,12 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import select
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
 from daq.mcap_writer import PARTIAL_SUFFIX
 from service.acquisition_process import LOG_NAME, read_request
 from service.archive import Archive, inspect_log
 from service.audit import announce, note
+from service.faults import fault_of
 from service.files import to_json, write_text
 from service.leases import require_lease
 from service.recordings import preview
@@ -81,13 +84,9 @@ class Runs:
         refuse_uncleared(robot.serial, robot.unattended, request.is_unattended)
         excitation = session.get(Excitation, request.excitation)
         if excitation is None or excitation.content is None:
-            raise NotFound(
-                f"There is no finished excitation {request.excitation}", "design one and wait for its job"
-            )
+            raise NotFound(f"There is no finished excitation {request.excitation}", "design one and wait for its job")
         if excitation.robot_serial != robot.serial or excitation.model_hash != robot.model_hash:
-            raise Unusable(
-                "The excitation is of another robot or description", "design one for this robot as it is"
-            )
+            raise Unusable("The excitation is of another robot or description", "design one for this robot as it is")
         run_id = new_id()
         place = self.folder / run_id
         place.mkdir()
@@ -122,9 +121,7 @@ class Runs:
         run = find_run(session, run_id)
         robot = robot_row(session, run.robot_serial)
         if robot_name != robot.name:
-            raise Unusable(
-                f"'{robot_name}' is not the name of robot {robot.serial}", "confirm with its exact name"
-            )
+            raise Unusable(f"'{robot_name}' is not the name of robot {robot.serial}", "confirm with its exact name")
         require_lease(session, robot.serial, by)
         refuse_uncleared(robot.serial, robot.unattended, bool(run.request["unattended"]))
         if run.state == "previewed" and run.created_at < now() - timedelta(minutes=_PREVIEW_MIN):
@@ -193,7 +190,8 @@ class Runs:
             if self._ended.wait(_LOOK_S) or (place / "abort").exists():
                 process.terminate()
                 process.wait()
-            self._show(run_id, place)
+            with contextlib.suppress(SQLAlchemyError):  # a busy database may cost a progress line, never the run
+                self._show(run_id, place)
         report = _read(place / "report.json")
         fault = report.get("fault")
         if not report:
@@ -212,6 +210,15 @@ class Runs:
 
     def _settle(self, run_id: str, event: str, fault: dict[str, Any] | None) -> None:
         log = self._salvaged(self.folder / run_id)
+        try:
+            self._conclude(run_id, event, fault, log)
+        except Exception as error:  # a log that cannot be stored stays in the run's folder; the run ends all the same
+            cause = f"The log of the run could not be stored: {fault_of(error)['cause']}"
+            remedy = f"it is kept in {self.folder / run_id}"
+            not_kept = {"code": "log_not_stored", "cause": cause, "remedy": remedy}
+            self._conclude(run_id, "fail" if event == "finish" else event, fault or not_kept, None)
+
+    def _conclude(self, run_id: str, event: str, fault: dict[str, Any] | None, log: Path | None) -> None:
         with self.database.write() as session:
             run = find_run(session, run_id)
             if log is not None:
@@ -236,7 +243,7 @@ class Runs:
         return log if log.is_file() else None
 
     def _keep(self, session: Session, run: Run, log: Path) -> Recording:
-        incoming = self.archive.receive()
+        incoming = self.archive.receive(is_limited=False)  # what was measured is never refused for its size
         try:
             with log.open("rb") as stream:
                 while block := stream.read(1 << 20):
