@@ -14,7 +14,7 @@ from identify.diagnosis.change_words import change_finding
 from identify.diagnosis.findings import Diagnosis, Finding, Unexplained
 from identify.diagnosis.hypotheses import hypotheses_of
 from identify.diagnosis.problem import Problem
-from identify.fit import Fit, FitOptions, choose_kind
+from identify.fit import Fit, FitOptions
 from identify.model import Model
 from service.errors import EstimateError
 from service.estimate_reading import Estimate

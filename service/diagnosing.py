@@ -15,8 +15,8 @@ from service.against_simulation import against_simulation
 from service.datasets import dataset_of, open_recording
 from service.diagnosis_file import diagnosis_content
 from service.estimate_reading import Estimate, read_estimate
-from service.identification import robot_for, same_robot
 from service.held_out_checks import proven_only
+from service.identification import robot_for, same_robot
 from service.robots import LoadedRobot
 from service.saturation import without_saturation
 
