@@ -40,7 +40,7 @@ class Server:
         headers = {"Authorization": f"Bearer {self.tokens[who]}"} if who else {}
         return TestClient(self.app, base_url="http://lab", headers=headers, raise_server_exceptions=False)
 
-    def finished(self, location, seconds=60):
+    def finished(self, location, seconds=180):
         """What a job led to."""
         anna = self.client("read")
         deadline = time.monotonic() + seconds
