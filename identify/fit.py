@@ -103,6 +103,11 @@ class Fit:
     tables: tuple[tuple[FloatArray, float], ...] = ()
 
     @property
+    def replicated(self) -> bool:
+        """Whether the noise is known from repeats, so that a misfit can be told from it."""
+        return all(noise.replicated for noise in self.noises)
+
+    @property
     def theta(self) -> FloatArray:
         """Parameters, nan where not identifiable, shape (P,)."""
         count = len(self.model.parameters)

@@ -162,7 +162,7 @@ def _inflation(problem: Problem, q: FloatArray, rest: FloatArray) -> FloatArray:
     Without replicates the residual's own correlation stands for the noise's: Newey-West over the scores of the
     direction, the effect itself taken out.
     """
-    if all(noise.replicated for noise in problem.fit.noises):
+    if problem.fit.replicated:
         return np.ones(q.shape[1])
     total, first = np.zeros(q.shape[1]), 0
     for block in problem.blocks:
@@ -219,7 +219,7 @@ def all_trials(
         The trials that the baseline does not swallow.
     """
     keys: list[tuple[Effect, Place, dict[str, float]]] = []
-    inside = all(noise.replicated for noise in problem.fit.noises)
+    inside = problem.fit.replicated
     for effect in (item for item in effects if not item.progressive):
         shapes = shapes_of(effect)
         for place in effect.places(problem.scene):

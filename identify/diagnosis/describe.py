@@ -6,6 +6,7 @@ import numpy as np
 
 from identify.diagnosis.augmented import Addition
 from identify.diagnosis.blind_spots import place_name
+from identify.diagnosis.candidates import Trial
 from identify.diagnosis.findings import FoundParameter, Where, rounded
 from identify.diagnosis.problem import Problem
 from identify.rotations import FloatArray
@@ -15,8 +16,8 @@ _CONCENTRATED = 0.8  # share of the energy that must sit in a region worth namin
 _NARROW = 0.45  # share of the samples such a region may have
 
 
-def contribution(problem: Problem, item: Addition) -> FloatArray:
-    """Whitened contribution of an effect, shape (rows,)."""
+def contribution(problem: Problem, item: Addition | Trial) -> FloatArray:
+    """Whitened contribution of a fitted effect, shape (rows,)."""
     return problem.columns(item.effect, item.place, item.shape) @ item.values
 
 

@@ -14,7 +14,14 @@ from identify.diagnosis.augmented import Augmented, fit_jointly
 from identify.diagnosis.between import ForeignTone, Progress, foreign_tones, pick_progress
 from identify.diagnosis.blind_spots import blind_spots, place_name
 from identify.diagnosis.candidates import all_trials, at_an_end, best_by_place, log_chance
-from identify.diagnosis.describe import carrying_channels, parameters_of, readable_place, sentence_of, where_of
+from identify.diagnosis.describe import (
+    carrying_channels,
+    contribution,
+    parameters_of,
+    readable_place,
+    sentence_of,
+    where_of,
+)
 from identify.diagnosis.findings import (
     ChannelFit,
     Diagnosis,
@@ -77,7 +84,7 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
     selection = backward(problem, select(problem, effects, LEVEL_NAMED * options.level, rng), LEVEL_NAMED * options.level)
     selection, rest = _gate(problem, selection, options)
     augmented, renewed = fit_jointly(problem, [item.trial for item in selection.named])
-    if not all(noise.replicated for noise in fit.noises):
+    if not fit.replicated:
         firm = [n for n, a in zip(selection.named, augmented.additions, strict=True) if not at_an_end(a.effect, a.shape)]
         if len(firm) < len(selection.named):
             selection = rebased(problem, selection, firm)
@@ -103,7 +110,6 @@ def diagnose(fit: Fit, other: Dataset | None = None, options: DiagnoseOptions | 
         locate(fit),
         next_experiment(findings, unexplained),
         rest.structures,
-        (),
         _warnings(fit),
         {"augmented": augmented, "progress": tuple(item for item, _ in progress), "problem": problem, "renewed": renewed},
     )
@@ -115,7 +121,7 @@ def _warnings(fit: Fit) -> tuple[str, ...]:
 
 def _gate(problem: Problem, selection: Selection, options: DiagnoseOptions) -> tuple[Selection, Adequacy]:
     """Take back names that leave too much on their own channels, and those that then no longer stand out."""
-    if not all(noise.replicated for noise in problem.fit.noises):
+    if not problem.fit.replicated:
         return selection, Adequacy(1.0, {}, (), {})  # without replicates nothing says what noise would leave
     level = LEVEL_REST * options.level
     rest = examine(problem, selection.basis, selection.residual)
@@ -129,8 +135,7 @@ def _gate(problem: Problem, selection: Selection, options: DiagnoseOptions) -> t
 
 def _leaves_too_much(problem: Problem, item: Named, rest: Adequacy, level: float) -> bool:
     trial = item.trial
-    whitened = problem.columns(trial.effect, trial.place, trial.shape) @ trial.values
-    home = carrying_channels(problem, whitened)
+    home = carrying_channels(problem, contribution(problem, trial))
     left = [s.gain - s.width for s in rest.structures if s.p_value < level and s.channel in home]
     left += [rest.excess[c] for c, p in rest.channel_p.items() if p < level / len(rest.channel_p) and c in home]
     return bool(left) and max(left) > _LEFTOVER * trial.gain

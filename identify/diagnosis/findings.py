@@ -11,7 +11,6 @@ from identify.diagnosis.adequacy import Structure
 from identify.diagnosis.blind_spots import BlindSpot
 from identify.diagnosis.held_out import HeldOut
 from identify.diagnosis.locate import Location
-from identify.rotations import FloatArray
 
 VERDICTS = ("consistent", "explained", "partly_explained", "unexplained")
 
@@ -101,7 +100,6 @@ class Diagnosis:
         location: internal against external.
         next_experiment: what to record next, or None.
         structures: curves of the baseline residual against states, for plots.
-        curves: contribution of every finding and the residual it explains, for plots.
         warnings: what the reader must know.
         model: what ``simulate`` and ``export`` need of the augmented model.
     """
@@ -115,7 +113,6 @@ class Diagnosis:
     location: Location
     next_experiment: Mapping[str, object] | None
     structures: tuple[Structure, ...] = field(default=())
-    curves: tuple[FloatArray, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
     model: Mapping[str, object] = field(default_factory=dict)
 

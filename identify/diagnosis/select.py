@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identify.diagnosis.candidates import Trial, all_trials, at_an_end, best_by_place, project, refine, trial
-from identify.diagnosis.describe import carrying_channels
+from identify.diagnosis.describe import carrying_channels, contribution
 from identify.diagnosis.null import FamilyNull, family_null
 from identify.diagnosis.problem import Problem
 from identify.physics.effect import Effect
@@ -123,18 +123,18 @@ def _only_polish(problem: Problem, winner: Trial, named: list[Named]) -> bool:
 
 def _too_small(problem: Problem, item: Trial) -> bool:
     """Whether, without replicates, an effect is below the floor that every real recording keeps."""
-    if all(noise.replicated for noise in problem.fit.noises):
+    if problem.fit.replicated:
         return False
     if at_an_end(item.effect, item.shape):
         return True
-    share = problem.columns(item.effect, item.place, item.shape) @ item.values
+    share = contribution(problem, item)
     whole = problem.whiten([block.target[:, None, :] for block in problem.blocks])[:, 0]
     rows = problem.channel_slices[carrying_channels(problem, share)[0]]
     return bool(np.linalg.norm(share[rows]) < _SIZE_FLOOR * np.linalg.norm(whole[rows]))
 
 
 def _home(problem: Problem, item: Trial) -> tuple[str, ...]:
-    return carrying_channels(problem, problem.columns(item.effect, item.place, item.shape) @ item.values)
+    return carrying_channels(problem, contribution(problem, item))
 
 
 def _decide(
@@ -144,7 +144,7 @@ def _decide(
     lead = max(item.penalised for item in ranked)
     near = [item for item in ranked if item.penalised > 0.6 * lead - _CLOSE][:14]
     refined = sorted((refine(problem, basis, residual, item) for item in near), key=lambda item: -item.penalised)
-    if not all(noise.replicated for noise in problem.fit.noises):
+    if not problem.fit.replicated:
         refined = [item for item in refined if not at_an_end(item.effect, item.shape)] or refined[:1]
     winner = refined[0]
     rivals = [
