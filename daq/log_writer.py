@@ -64,6 +64,7 @@ class LogWriter:
         self._offsets: list[int] = []
         self._ids: list[int] = []
         self._times: list[int] = []
+        self.metadata: dict[str, str] = {}
         if metadata:
             self.add_metadata(metadata)
         for name, data in (attachments or {}).items():
@@ -81,8 +82,12 @@ class LogWriter:
             self.abort()
 
     def add_metadata(self, metadata: Mapping[str, str]) -> None:
-        """Add to the run's record, such as the proof of completeness at its end; later values win."""
-        self.file.add_metadata(METADATA_RECORD, metadata)
+        """Add to the run's record, such as the proof of completeness at its end; later values win.
+
+        Every record written holds all that was said so far: a reader that takes only the last one misses nothing.
+        """
+        self.metadata = {**self.metadata, **metadata}
+        self.file.add_metadata(METADATA_RECORD, self.metadata)
 
     def write_joint_states(
         self, stamp_ns: int, log_time_ns: int, sequence: int, names: Sequence[str], position: Numbers,

@@ -11,6 +11,7 @@ import numpy as np
 
 from daq.checks import unwrapped
 from daq.errors import DataError
+from daq.log_reader import METADATA_RECORD
 from daq.log_writer import LogWriter
 from daq.mcap_file import checked, decompressor, load_bytes
 from daq.mcap_records import (
@@ -329,7 +330,7 @@ def _write(found: _Salvage, output: str | Path, addition: Addition) -> Mapping[i
         for attachment in found.attachments:
             writer.add_attachment(attachment.name, attachment.data)
         seen = _write_messages(found, writer)
-        _write_addition(addition, writer)
+        _write_addition(addition, writer, found)
         writer.finish()
     except BaseException:
         writer.abandon(keep=False)
@@ -337,8 +338,11 @@ def _write(found: _Salvage, output: str | Path, addition: Addition) -> Mapping[i
     return {channel: np.array(rows, np.int64) for channel, rows in seen.items()}
 
 
-def _write_addition(addition: Addition, writer: McapWriter) -> None:
+def _write_addition(addition: Addition, writer: McapWriter, found: _Salvage) -> None:
     log = LogWriter(writer.path, file=writer)
+    for name, mapping in found.metadata:
+        if name == METADATA_RECORD:
+            log.metadata.update(mapping)
     if addition.metadata:
         log.add_metadata(addition.metadata)
     log.write_streams(addition.streams)

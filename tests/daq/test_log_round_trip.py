@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 
 from daq.cdr import layout_of, template
 from daq.log_reader import read_raw, read_recording
@@ -175,6 +176,9 @@ def test_later_metadata_wins(tmp_path):
         log.write_joint_states(logs.START_NS, logs.START_NS, 0, ("a",), [0.0])
         log.add_metadata({"missing": "0"})
     assert read_recording(tmp_path / "m.mcap").metadata == {"kind": "free", "missing": "0"}
+    with (tmp_path / "m.mcap").open("rb") as stream:
+        last = list(make_reader(stream).iter_metadata())[-1]
+    assert last.metadata == {"kind": "free", "missing": "0"}  # whole for readers that take one record
 
 
 _TEXT = st.text(st.characters(exclude_characters="\0", exclude_categories=("Cs",)), max_size=9)
